@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// PointCloud: the points of a reconstruction as parallel arrays, each point knowing its pixel.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+// All arrays have one entry per point. Positions are in the reconstruction's frame and units.
+struct PointCloud {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<float> confidence;
+  std::vector<uint32_t> pixels;  // index into the reconstruction's [S, H, W]
+
+  size_t size() const { return positions.size(); }
+};
+
+// Eq. 1 of the paper: the point of a pixel, R^-1 (D K^-1 u - t), pixel centres at integers;
+// out_from_world is applied to it in double precision before rounding.
+Eigen::Vector3f unproject_pixel(const Reconstruction& reconstruction, uint32_t pixel,
+                                const Sim3& out_from_world = {});
+
+// The points of all pixels with depth > 0 and confidence > min_confidence, in pixel order.
+PointCloud unproject(const Reconstruction& reconstruction, float min_confidence,
+                     const Sim3& out_from_world = {});
+
+}  // namespace vggtcd
