@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// vggt-cd: dispatches to the subcommands and turns an Error into one line and an exit status.
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <new>
+
+#include "vggtcd/cli/command.h"
+#include "vggtcd/cli/terminal_progress.h"
+#include "vggtcd/core/interrupt.h"
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/core/version.h"
+
+namespace vggtcd::cli {
+namespace {
+
+int fail(ErrorCode code, std::string_view what) {
+  fmt::print(stderr, "vggt-cd: {}\n", what);
+  return static_cast<int>(code);
+}
+
+int run(int argc, char** argv) {
+  Program program;
+  program.app.name("vggt-cd");
+  program.app.description("Tells what changed in 3D between two sets of photos of one place.");
+  program.app.set_version_flag("--version", std::string("vggt-cd ") + kVersion);
+  program.app.require_subcommand(1);
+  program.app.footer(
+      "'vggt-cd COMMAND --help' explains a command. Exit statuses: docs/formats.md.");
+  try {
+    program.app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.app.exit(error);  // --help, --version
+    return fail(ErrorCode::kUsage, error.what() + std::string(" (try --help)"));
+  }
+  if (program.common.threads > 0) set_num_threads(program.common.threads);
+  install_interrupt_handler();
+  const std::unique_ptr<ProgressSink> progress = make_progress(program.common.progress);
+  program.action(*progress);
+  return 0;
+}
+
+}  // namespace
+}  // namespace vggtcd::cli
+
+int main(int argc, char** argv) {
+  using vggtcd::Error;
+  using vggtcd::ErrorCode;
+  try {
+    return vggtcd::cli::run(argc, argv);
+  } catch (const Error& error) {
+    return vggtcd::cli::fail(error.code(), error.what());
+  } catch (const std::bad_alloc&) {
+    return vggtcd::cli::fail(ErrorCode::kMemory, "out of memory; use fewer or smaller photos");
+  } catch (const std::exception& error) {
+    return vggtcd::cli::fail(ErrorCode::kInternal,
+                             fmt::format("internal error: {}; please report it", error.what()));
+  }
+}
