@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Weights without a weights file: every value is a pure function of the tensor's name, its shape
+// and a seed. The reference network's outputs in tests/golden were computed with these very
+// weights.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "vggtcd/core/tensor_view.h"
+
+namespace vggtcd::testing {
+
+// What decides the names and shapes of a VGGT. Head width is 64, patches are 14 pixels.
+struct NetworkSizes {
+  int64_t image_size;  // px; the position embedding covers (image_size / 14)^2 patches
+  int64_t embed_dim;
+  int64_t num_heads;
+  int64_t depth;      // frame blocks, and as many global blocks
+  int64_t vit_depth;  // blocks of the patch embedder
+  int64_t camera_num_heads;
+  int64_t dpt_features;
+  std::array<int64_t, 4> dpt_out_channels;
+  std::array<int64_t, 4> dpt_layers;
+
+  static NetworkSizes tiny();     // golden cases: seed 1
+  static NetworkSizes vggt_1b();  // golden cases: seed 7
+};
+
+// The hyper-parameters as the JSON text that weight files carry under the metadata key "config".
+std::string network_config_json(const NetworkSizes& sizes);
+
+struct TensorSpec {
+  std::string name;
+  std::vector<int64_t> shape;
+};
+
+inline constexpr std::array<std::string_view, 4> kAllModules = {"aggregator", "camera_head",
+                                                                "point_head", "depth_head"};
+
+// Every tensor of these modules (a subset of kAllModules), in state_dict order.
+std::vector<TensorSpec> tensor_specs(const NetworkSizes& sizes,
+                                     std::span<const std::string_view> modules = kAllModules);
+
+// The recipe. `index` counts in C order.
+//   splitmix64(x): z = x + 0x9E3779B97F4A7C15; z = (z ^ z>>30) * 0xBF58476D1CE4E5B9;
+//                  z = (z ^ z>>27) * 0x94D049BB133111EB; z ^ z>>31
+//   key = fnv1a64(name) ^ splitmix64(seed)
+//   u = (splitmix64(key + index) >> 40) * 2^-23 - 1, in [-1, 1)
+//   value = float(offset + scale * u), offset and scale chosen by name and shape
+uint64_t splitmix64(uint64_t x);
+uint64_t fnv1a64(std::string_view text);
+void fill_by_recipe(const TensorSpec& spec, uint64_t seed, float* values);  // in parallel
+
+// Owns f32 tensors made by the recipe. All of VGGT-1B without its track head is 4.8 GB.
+class RecipeWeights {
+ public:
+  RecipeWeights(const NetworkSizes& sizes, uint64_t seed,
+                std::span<const std::string_view> modules = kAllModules);
+  const std::vector<TensorView>& tensors() const { return tensors_; }  // valid while this lives
+  const std::string& config_json() const { return config_json_; }
+
+ private:
+  struct Free {
+    void operator()(float* memory) const;
+  };
+  std::unique_ptr<float, Free> memory_;
+  std::vector<TensorView> tensors_;
+  std::string config_json_;
+};
+
+}  // namespace vggtcd::testing
