@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// A toy reconstruction for tests: a few cameras looking at a bumpy relief, exact depth, in any
+// frame.
+#pragma once
+
+#include <functional>
+
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd::testing_support {
+
+struct ToyScene {
+  int frames = 4;
+  int width = 48, height = 36;
+  double camera_offset = 0;  // shifts the walk, so that two epochs differ in viewpoints
+  // Height of the relief over the plane z = 5 at (x, y), towards the cameras; must stay below 1.
+  std::function<double(double x, double y)> relief = [](double, double) { return 0.0; };
+};
+
+// Cameras walk along x at z = 0 and look towards +z. Depth by marching along the ray; confidence
+// falls with the pixel's distance to the image centre; colour is a checkerboard of the surface. The
+// world of the result is frame_from_scene * scene.
+Reconstruction reconstruct(const ToyScene& scene, const Sim3& frame_from_scene);
+
+}  // namespace vggtcd::testing_support
