@@ -42,7 +42,7 @@ size_t attention_workspace_bytes(const AttentionShape& shape, bool bf16);
 // Error: in f32 that of f32 dot products (rel L2 about 1e-6 for scores of order one; the exponent
 // carries the absolute error of a score, about 2^-24 |scale| sum |q k| + 2^-24 |score|). In bf16
 // products and softmax are f32; probabilities are rounded to bf16 where the processor multiplies
-// bf16 and the result always, so |error| <= 2^-8 (sum p |v| + |out|) beside that of the scores.
+// bf16 and the result always, so |error| <= 2^-8 (sum p |v| + 2 |out|) beside that of the scores.
 // Same bits for any number of threads. docs/numerics.md has the tests.
 void attention_f32(const AttentionShape& shape, const float* q, const float* k, const float* v,
                    int64_t row_stride, float* out, int64_t out_row_stride, float scale,
