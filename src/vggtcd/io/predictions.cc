@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prediction files: which program wrote this, where are its arrays, and are they what they should
+// be. The conventions are in docs/formats.md, "Prediction files".
+#include "vggtcd/io/predictions.h"
+
+#include <fmt/ranges.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/core/tensor_view.h"
+#include "vggtcd/core/timer.h"
+#include "vggtcd/io/npz.h"
+#include "vggtcd/io/prediction_layout.h"
+
+namespace vggtcd {
+namespace {
+
+using internal::PredictionLayout;
+
+void expect_float(const NpzReader& npz, const std::string& key) {
+  const NpyHeader& header = npz.header(key);
+  if (header.kind != NpyKind::kFloat) {
+    throw_error(ErrorCode::kInput, "{}: {}: expected floating-point numbers, found type {}",
+                npz.name(), key, header.descr);
+  }
+}
+
+// depth is [S, H, W] or [S, H, W, 1] and says what S, H and W are.
+void read_frame_size(const NpzReader& npz, PredictionLayout& layout) {
+  const std::vector<int64_t>& shape = npz.header("depth").shape;
+  const bool three = shape.size() == 3, four = shape.size() == 4 && shape[3] == 1;
+  constexpr int64_t kMaxSide = 1 << 20;
+  if ((!three && !four) || shape[1] < 1 || shape[2] < 1 || shape[1] > kMaxSide ||
+      shape[2] > kMaxSide || shape[0] > kMaxSide) {
+    throw_error(ErrorCode::kInput, "{}: depth: expected shape [S, H, W] or [S, H, W, 1], found {}",
+                npz.name(), shape_string(shape));
+  }
+  layout.frames = shape[0];
+  layout.height = shape[1];
+  layout.width = shape[2];
+}
+
+PredictionLayout find_layout(const NpzReader& npz) {
+  PredictionLayout layout;
+  if (npz.has("extrinsic")) {
+    layout.poses = "extrinsic";
+    layout.intrinsics = "intrinsic";
+  } else if (npz.has("extrinsics")) {  // Depth Anything 3
+    layout.poses = "extrinsics";
+    layout.intrinsics = "intrinsics";
+  } else {
+    throw_error(ErrorCode::kInput,
+                "{}: expected predictions with an array extrinsic (VGGT, MapAnything) or "
+                "extrinsics (Depth Anything 3), found {}",
+                npz.name(), fmt::join(npz.keys(), ", "));
+  }
+  for (const std::string& key : {layout.poses, layout.intrinsics, std::string("depth")}) {
+    expect_float(npz, key);
+  }
+  read_frame_size(npz, layout);
+  const std::vector<int64_t>& poses = npz.header(layout.poses).shape;
+  const bool square = poses.size() == 3 && poses[1] == 4;
+  npz.expect_shape(layout.poses, std::vector<int64_t>{layout.frames, square ? 4 : 3, 4});
+  npz.expect_shape(layout.intrinsics, std::vector<int64_t>{layout.frames, 3, 3});
+  // MapAnything saves 4 x 4 matrices under VGGT's key, and they are the inverse of VGGT's.
+  layout.world_from_camera = square && layout.poses == "extrinsic";
+  for (const char* key : {"depth_conf", "conf"}) {
+    if (layout.confidence.empty() && npz.has(key)) layout.confidence = key;
+  }
+  for (const char* key : {"images", "image"}) {
+    if (layout.images.empty() && npz.has(key)) layout.images = key;
+  }
+  for (const char* key : {"world_points_from_depth", "world_points"}) {
+    if (layout.world_points.empty() && npz.has(key)) layout.world_points = key;
+  }
+  // MapAnything computes its world_points from depth; VGGT predicts them separately.
+  layout.points_are_exact =
+      layout.world_points == "world_points_from_depth" || layout.world_from_camera;
+  return layout;
+}
+
+// [S, H, W] of the layout, with or without a last axis of 1.
+void expect_map(const NpzReader& npz, const std::string& key, const PredictionLayout& layout) {
+  std::vector<int64_t> shape{layout.frames, layout.height, layout.width};
+  if (npz.header(key).shape.size() == 4) shape.push_back(1);
+  npz.expect_shape(key, shape);
+}
+
+// Poses are stored in 16 or 32 bits: a rotation is accepted within 1e-2 (half precision has
+// 5e-4 per entry) and replaced by the nearest exact one, as Rigid3 relies on R^-1 = R^T.
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix, const std::string& where) {
+  const double error =
+      (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(error <= 1e-2) || matrix.determinant() < 0) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected a rotation, found |R^T R - I| = {:.2g} and determinant {:.2g}", where,
+                error, matrix.determinant());
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
+Rigid3 read_pose(const double* values, bool has_last_row, bool world_from_camera,
+                 const std::string& where) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> top(values);
+  if (!top.allFinite()) throw_error(ErrorCode::kInput, "{}: expected finite numbers", where);
+  if (has_last_row) {
+    const Eigen::Map<const Eigen::RowVector4d> last(values + 12);
+    if (!last.isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-3)) {
+      throw_error(ErrorCode::kInput, "{}: expected the last row 0 0 0 1, found {} {} {} {}", where,
+                  last[0], last[1], last[2], last[3]);
+    }
+  }
+  const Rigid3 pose{nearest_rotation(top.leftCols<3>(), where), top.col(3)};
+  return world_from_camera ? pose.inverse() : pose;
+}
+
+Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std::string& where) {
+  const bool finite = std::all_of(k, k + 9, [](double value) { return std::isfinite(value); });
+  const bool form = std::abs(k[1]) <= 1e-3 * std::abs(k[0]) && k[3] == 0 && k[6] == 0 &&
+                    k[7] == 0 && std::abs(k[8] - 1) <= 1e-3;
+  if (!finite || !form || !(k[0] > 0) || !(k[4] > 0)) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected fx 0 cx / 0 fy cy / 0 0 1 with fx, fy > 0, found "
+                "{:g} {:g} {:g} / {:g} {:g} {:g} / {:g} {:g} {:g}",
+                where, k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8]);
+  }
+  return {k[0], k[4], k[2], k[5], static_cast<int>(layout.width), static_cast<int>(layout.height)};
+}
+
+// The photos' names, without directories: results are named after them. Names that are empty or
+// not distinct are of no use and are replaced like missing ones.
+std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout& layout) {
+  std::vector<std::string> names;
+  if (npz.has("names")) {
+    npz.expect_shape("names", std::vector<int64_t>{layout.frames});
+    for (const std::string& path : npz.read_strings("names")) {
+      std::string name = path.substr(path.find_last_of("/\\") + 1);
+      std::erase_if(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+      if (!name.empty() && name != "." && name != "..") names.push_back(name);
+    }
+  }
+  const size_t frames = static_cast<size_t>(layout.frames);
+  if (names.size() != frames || std::set(names.begin(), names.end()).size() != frames) {
+    names.clear();
+    for (size_t i = 0; i < frames; ++i) names.push_back(fmt::format("frame_{:06d}", i));
+  }
+  return names;
+}
+
+std::vector<View> read_views(const NpzReader& npz, const PredictionLayout& layout) {
+  const std::vector<double> poses = npz.read<double>(layout.poses);
+  const std::vector<double> intrinsics = npz.read<double>(layout.intrinsics);
+  const std::vector<std::string> names = read_names(npz, layout);
+  const size_t frames = static_cast<size_t>(layout.frames);
+  const size_t stride = frames == 0 ? 12 : poses.size() / frames;
+  std::vector<View> views(frames);
+  for (size_t i = 0; i < frames; ++i) {
+    const auto where = [&](const std::string& key) {
+      return fmt::format("{}: {}: frame {}", npz.name(), key, i);
+    };
+    views[i].camera_from_world = read_pose(poses.data() + i * stride, stride == 16,
+                                           layout.world_from_camera, where(layout.poses));
+    views[i].pinhole = read_pinhole(intrinsics.data() + i * 9, layout, where(layout.intrinsics));
+    views[i].name = names[i];
+  }
+  return views;
+}
+
+void read_confidence(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result,
+                     ProgressSink& progress) {
+  result.confidence.resize(result.num_pixels());
+  if (layout.confidence.empty()) {
+    std::fill(result.confidence.begin(), result.confidence.end(), 1.0f);
+    progress.notice(npz.name() + ": no confidence (depth_conf or conf); all pixels count the same");
+    return;
+  }
+  expect_float(npz, layout.confidence);
+  expect_map(npz, layout.confidence, layout);
+  npz.read_into<float>(layout.confidence, result.confidence);
+}
+
+// MapAnything's final_mask: pixels that are false have no depth.
+void apply_mask(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result) {
+  if (!npz.has("final_mask")) return;
+  expect_map(npz, "final_mask", layout);
+  npz.read_slabs<uint8_t>("final_mask", [&](int64_t first, std::span<const uint8_t> mask) {
+    for (size_t i = 0; i < mask.size(); ++i) {
+      if (mask[i] == 0) result.depth[static_cast<size_t>(first) + i] = 0;
+    }
+  });
+}
+
+// Finite, and so is the mean of two of them.
+constexpr float kLargestConfidence = 1e30f;
+
+// After this, depth is >= 0 and finite, and confidence can be ranked.
+void drop_invalid_pixels(const std::string& name, Reconstruction& result, ProgressSink& progress) {
+  size_t dropped = 0;
+  std::vector<std::string> empty_frames;
+  for (int frame = 0; frame < result.num_frames(); ++frame) {
+    const size_t begin = static_cast<size_t>(frame) * result.pixels_per_frame();
+    bool any = false;
+    for (size_t i = begin; i < begin + result.pixels_per_frame(); ++i) {
+      float& depth = result.depth[i];
+      float& confidence = result.confidence[i];
+      // Half precision saves the best confidences as infinity; they stay the best.
+      if (confidence > kLargestConfidence) confidence = kLargestConfidence;
+      const bool good_confidence = confidence >= -kLargestConfidence;
+      if (!(depth >= 0 && std::isfinite(depth) && good_confidence)) {
+        ++dropped;
+        depth = 0;
+        if (!good_confidence) confidence = 0;
+      }
+      any |= depth > 0;
+    }
+    if (!any) empty_frames.push_back(result.views[static_cast<size_t>(frame)].name);
+  }
+  if (empty_frames.size() == result.views.size()) {
+    throw_error(ErrorCode::kInput,
+                "{}: depth: expected positive numbers, found none in any of {} frames", name,
+                result.views.size());
+  }
+  if (dropped > 0) {
+    progress.notice(fmt::format(
+        "{}: {} of {} pixels have NaN, infinite or negative depth or confidence and are ignored",
+        name, dropped, result.num_pixels()));
+  }
+  if (!empty_frames.empty()) {
+    progress.notice(fmt::format("{}: frames without any valid depth are skipped: {}", name,
+                                fmt::join(empty_frames, ", ")));
+  }
+}
+
+// images is [S, 3, H, W] or [S, H, W, 3], u8 or a float in [0, 1].
+void read_colors(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result,
+                 ProgressSink& progress) {
+  constexpr uint8_t kGray = 128;
+  result.color.assign(3 * result.num_pixels(), kGray);
+  if (layout.images.empty()) {
+    progress.notice(npz.name() + ": no images; colours are grey");
+    return;
+  }
+  const NpyHeader& header = npz.header(layout.images);
+  const bool planes =
+      header.shape == std::vector<int64_t>{layout.frames, 3, layout.height, layout.width};
+  if (!planes) {
+    npz.expect_shape(layout.images,
+                     std::vector<int64_t>{layout.frames, layout.height, layout.width, 3});
+  }
+  const size_t per_frame = result.pixels_per_frame();
+  // [S, 3, H, W] -> [S, H, W, 3]
+  const auto target = [&](size_t index) {
+    if (!planes) return index;
+    const size_t plane = index / per_frame;
+    return ((plane / 3) * per_frame + index % per_frame) * 3 + plane % 3;
+  };
+  if (header.kind == NpyKind::kUnsigned) {
+    npz.read_slabs<uint8_t>(layout.images, [&](int64_t first, std::span<const uint8_t> values) {
+      for (size_t i = 0; i < values.size(); ++i) {
+        result.color[target(static_cast<size_t>(first) + i)] = values[i];
+      }
+    });
+    return;
+  }
+  expect_float(npz, layout.images);
+  npz.read_slabs<float>(layout.images, [&](int64_t first, std::span<const float> values) {
+    for (size_t i = 0; i < values.size(); ++i) {
+      if (!(values[i] >= -1e-3f && values[i] <= 1.001f)) {
+        throw_error(ErrorCode::kInput, "{}: {}: expected values in [0, 1], found {:g}", npz.name(),
+                    layout.images, values[i]);
+      }
+      const float level = std::clamp(values[i], 0.0f, 1.0f) * 255.0f;
+      result.color[target(static_cast<size_t>(first) + i)] =
+          static_cast<uint8_t>(std::lround(level));
+    }
+  });
+}
+
+void check_limits(const NpzReader& npz, const PredictionLayout& layout, int min_frames) {
+  if (layout.frames < min_frames) {
+    throw_error(ErrorCode::kDegenerate, "{}: expected at least {} frames, found {}", npz.name(),
+                min_frames, layout.frames);
+  }
+  // frames, height and width are at most 2^20 each: no overflow.
+  const int64_t pixels = layout.frames * layout.height * layout.width;
+  if (pixels > std::numeric_limits<uint32_t>::max()) {
+    throw_error(ErrorCode::kInput, "{}: expected fewer than 2^32 pixels, found {}", npz.name(),
+                pixels);
+  }
+  const int64_t needed = pixels * 11;  // depth, confidence, colour
+  const int64_t available = available_memory_bytes();
+  if (needed > available) {
+    throw_error(ErrorCode::kMemory, "{}: needs {} MB of memory, {} MB are free; use fewer frames",
+                npz.name(), needed >> 20, available >> 20);
+  }
+}
+
+Reconstruction read_arrays(const NpzReader& npz, ProgressSink& progress, int min_frames) {
+  const PredictionLayout layout = find_layout(npz);
+  check_limits(npz, layout, min_frames);
+  Reconstruction result;
+  result.height = static_cast<int>(layout.height);
+  result.width = static_cast<int>(layout.width);
+  result.views = read_views(npz, layout);
+  result.depth.resize(result.num_pixels());
+  npz.read_into<float>("depth", result.depth);
+  read_confidence(npz, layout, result, progress);
+  apply_mask(npz, layout, result);
+  drop_invalid_pixels(npz.name(), result, progress);
+  internal::verify_poses(npz, layout, result, progress);
+  read_colors(npz, layout, result, progress);
+  check_consistent(result);
+  return result;
+}
+
+std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key, int num_frames) {
+  npz.expect_shape(key, std::vector<int64_t>{-1});
+  std::vector<int> keyframes;
+  for (const int64_t frame : npz.read<int64_t>(key)) {
+    if (frame < 0 || frame >= num_frames) {
+      throw_error(ErrorCode::kInput, "{}: {}: expected frame numbers from 0 to {}, found {}",
+                  npz.name(), key, num_frames - 1, frame);
+    }
+    keyframes.push_back(static_cast<int>(frame));
+  }
+  if (std::set(keyframes.begin(), keyframes.end()).size() != keyframes.size()) {
+    throw_error(ErrorCode::kInput, "{}: {}: expected distinct frame numbers, found {}", npz.name(),
+                key, fmt::join(keyframes, ", "));
+  }
+  return keyframes;
+}
+
+}  // namespace
+
+Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
+                                   const PredictionLimits& limits) {
+  return read_arrays(NpzReader(path), progress, limits.min_frames);
+}
+
+JointReconstruction read_joint(const std::filesystem::path& path, const Reconstruction& before,
+                               const Reconstruction& after, ProgressSink& progress) {
+  const NpzReader npz(path);
+  JointReconstruction joint;
+  joint.keyframes_t1 = read_keyframes(npz, "keyframes_t1", before.num_frames());
+  joint.keyframes_t2 = read_keyframes(npz, "keyframes_t2", after.num_frames());
+  if (joint.keyframes_t1.empty() || joint.keyframes_t2.empty()) {
+    throw_error(ErrorCode::kDegenerate, "{}: expected keyframes of both epochs, found {} and {}",
+                npz.name(), joint.keyframes_t1.size(), joint.keyframes_t2.size());
+  }
+  joint.reconstruction = read_arrays(npz, progress, 2);
+  const Reconstruction& result = joint.reconstruction;
+  if (joint.keyframes_t1.size() + joint.keyframes_t2.size() != result.views.size()) {
+    throw_error(ErrorCode::kInput, "{}: expected one frame per keyframe ({} + {}), found {} frames",
+                npz.name(), joint.keyframes_t1.size(), joint.keyframes_t2.size(),
+                result.views.size());
+  }
+  for (const Reconstruction* epoch : {&before, &after}) {
+    if (epoch->width != result.width || epoch->height != result.height) {
+      throw_error(ErrorCode::kInput,
+                  "{}: expected frames of {} x {} as in the {} epoch, found {} x {}", npz.name(),
+                  epoch->width, epoch->height, epoch == &before ? "before" : "after", result.width,
+                  result.height);
+    }
+  }
+  return joint;
+}
+
+}  // namespace vggtcd

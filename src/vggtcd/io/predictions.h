@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prediction files of reconstruction networks -> Reconstruction: the .npz files of VGGT,
+// VGGT-Omega, MapAnything and Depth Anything 3. Keys and conventions are in docs/formats.md.
+#pragma once
+
+#include <filesystem>
+
+#include "vggtcd/core/progress.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+struct PredictionLimits {
+  int min_frames = 2;  // fewer: Error{kDegenerate}
+};
+
+// Reads one epoch. Depth that is NaN, infinite or negative, and depth whose confidence is not
+// a number, becomes 0 (no depth), with one notice; frames without any depth are named in a notice.
+// Where the file has world points, poses and depth are checked against them, because the same key
+// means opposite poses in different programs; a file that contradicts itself is refused.
+// Throws Error{kInput} for anything else that is not as docs/formats.md says.
+Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
+                                   const PredictionLimits& limits = {});
+
+// Reads the joint pass over keyframes of `before` and `after`: the same, with keyframes_t1 and
+// keyframes_t2. Throws Error{kInput} unless these are distinct frame numbers of the two epochs, one
+// for each frame, and all three passes have one frame size.
+JointReconstruction read_joint(const std::filesystem::path& path, const Reconstruction& before,
+                               const Reconstruction& after, ProgressSink& progress);
+
+// Writes a file that read_reconstruction reads: VGGT's keys extrinsic, intrinsic, depth,
+// depth_conf, images (u8, [S, H, W, 3]) and our own names. Throws Error{kOutput}.
+void write_reconstruction(const std::filesystem::path& path, const Reconstruction& reconstruction);
+// The same with the keyframes.
+void write_joint(const std::filesystem::path& path, const JointReconstruction& joint);
+
+}  // namespace vggtcd
