@@ -1,42 +1,156 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nearest neighbours by comparing all pairs.
+// Nearest neighbours: both clouds in Hilbert order, a tree of boxes over the targets, and packets
+// of 16 queries that search it together (nearest_neighbors_kernel.h).
 #include "vggtcd/geometry/nearest_neighbors.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/hilbert_order.h"
+#include "vggtcd/geometry/nearest_neighbors_tree.h"
 
 namespace vggtcd {
+namespace {
+
+constexpr size_t kLanes = kNearestNeighborLanes;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+std::vector<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
+  const std::vector<uint32_t> order = hilbert_order(points, kNearestNeighborLanes);
+  std::vector<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
+  parallel_for(static_cast<int64_t>(blocks.size()), 1024, [&](int64_t begin, int64_t end) {
+    for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {
+      for (size_t lane = 0; lane < kLanes; ++lane) {
+        const uint32_t index = order[std::min(b * kLanes + lane, order.size() - 1)];
+        const Eigen::Vector3f& point = points[index];
+        blocks[b].x[lane] = point.x();
+        blocks[b].y[lane] = point.y();
+        blocks[b].z[lane] = point.z();
+        blocks[b].index[lane] = static_cast<int32_t>(index);
+      }
+    }
+  });
+  return blocks;
+}
+
+// Child c of a node, from the block or the node that it is.
+void set_child(BoxNode& node, size_t c, const PointBlock& block) {
+  const float* coordinates[3] = {block.x, block.y, block.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax_element(coordinates[axis], coordinates[axis] + kLanes);
+    node.low[axis][c] = *low;
+    node.high[axis][c] = *high;
+  }
+  node.min_index[c] = *std::min_element(block.index, block.index + kLanes);
+}
+
+void set_child(BoxNode& node, size_t c, const BoxNode& child) {
+  for (int axis = 0; axis < 3; ++axis) {
+    node.low[axis][c] = *std::min_element(child.low[axis], child.low[axis] + kLanes);
+    node.high[axis][c] = *std::max_element(child.high[axis], child.high[axis] + kLanes);
+  }
+  node.min_index[c] = *std::min_element(child.min_index, child.min_index + kLanes);
+}
+
+template <typename Child>
+std::vector<BoxNode> make_level(const std::vector<Child>& children) {
+  std::vector<BoxNode> nodes((children.size() + kLanes - 1) / kLanes);
+  parallel_for(static_cast<int64_t>(nodes.size()), 256, [&](int64_t begin, int64_t end) {
+    for (size_t n = static_cast<size_t>(begin); n < static_cast<size_t>(end); ++n) {
+      std::fill_n(&nodes[n].low[0][0], 3 * kLanes, kInfinity);
+      std::fill_n(&nodes[n].high[0][0], 3 * kLanes, -kInfinity);
+      std::fill_n(nodes[n].min_index, kLanes, std::numeric_limits<int32_t>::max());
+      const size_t first = n * kLanes, count = std::min(kLanes, children.size() - first);
+      for (size_t c = 0; c < count; ++c) set_child(nodes[n], c, children[first + c]);
+    }
+  });
+  return nodes;
+}
+
+// The least float whose root is above the bound, so that "less" on squares means "within the
+// bound".
+float squared_limit(float bound) {
+  float limit = bound * bound;
+  if (!(limit < std::numeric_limits<float>::max())) return std::numeric_limits<float>::max();
+  while (std::sqrt(limit) <= bound) limit = std::nextafter(limit, kInfinity);
+  return limit;
+}
+
+using Kernel = void (*)(const NearestNeighborTree&, const NearestNeighborQuery&);
+
+Kernel kernel_for_this_processor() {
+  switch (cpu_level()) {
+    case CpuLevel::kReference:
+      return nearest_neighbors_reference;
+    case CpuLevel::kAvx2:
+      return nearest_neighbors_avx2;
+    case CpuLevel::kAvx512:
+    case CpuLevel::kAvx512Bf16:
+      return nearest_neighbors_avx512;
+  }
+  check(false, "nearest neighbors: unknown CpuLevel");
+  return nullptr;
+}
+
+}  // namespace
+
+struct NearestNeighborIndex::Impl {
+  size_t size = 0;
+  std::vector<PointBlock> blocks;
+  std::vector<std::vector<BoxNode>> levels;
+
+  explicit Impl(std::span<const Eigen::Vector3f> targets)
+      : size(targets.size()), blocks(make_blocks(targets)) {
+    if (blocks.empty()) return;
+    levels.push_back(make_level(blocks));
+    while (levels.back().size() > 1) levels.push_back(make_level(levels.back()));
+    check(levels.size() <= kMaxTreeLevels, "nearest neighbors: tree too high");
+  }
+
+  void query(const std::vector<PointBlock>& queries, float bound, std::span<float> distance,
+             std::span<int32_t> index) const {
+    check(bound >= 0, "nearest neighbors: bound >= 0");
+    check(index.empty() || index.size() == distance.size(),
+          "nearest neighbors: one index per query or none");
+    if (blocks.empty()) {
+      std::fill(distance.begin(), distance.end(), bound);
+      std::fill(index.begin(), index.end(), -1);
+      return;
+    }
+    NearestNeighborTree tree{blocks.data(), {}, static_cast<int>(levels.size())};
+    for (size_t level = 0; level < levels.size(); ++level)
+      tree.levels[level] = levels[level].data();
+    const float limit = squared_limit(bound);
+    const Kernel kernel = kernel_for_this_processor();
+    parallel_for(static_cast<int64_t>(queries.size()), 512, [&](int64_t begin, int64_t end) {
+      kernel(tree, {queries.data() + begin, end - begin, bound, limit, distance.data(),
+                    index.empty() ? nullptr : index.data()});
+    });
+  }
+};
 
 NearestNeighborIndex::NearestNeighborIndex(std::span<const Eigen::Vector3f> targets)
-    : targets_(targets.begin(), targets.end()) {
-  for (const Eigen::Vector3f& x : targets_)
-    check(x.allFinite(), "nearest neighbors: finite targets");
-}
+    : impl_(std::make_unique<const Impl>(targets)) {}
+NearestNeighborIndex::~NearestNeighborIndex() = default;
+NearestNeighborIndex::NearestNeighborIndex(NearestNeighborIndex&&) noexcept = default;
+NearestNeighborIndex& NearestNeighborIndex::operator=(NearestNeighborIndex&&) noexcept = default;
+
+size_t NearestNeighborIndex::size() const { return impl_->size; }
 
 void NearestNeighborIndex::query(std::span<const Eigen::Vector3f> queries, float bound,
                                  std::span<float> distance, std::span<int32_t> index) const {
-  check(bound >= 0, "nearest neighbors: bound >= 0");
   check(distance.size() == queries.size(), "nearest neighbors: one distance per query");
-  check(index.empty() || index.size() == queries.size(), "nearest neighbors: one index per query");
-  parallel_for(static_cast<int64_t>(queries.size()), 256, [&](int64_t begin, int64_t end) {
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      float best = bound * bound;
-      int32_t best_index = -1;
-      for (size_t j = 0; j < targets_.size(); ++j) {
-        const Eigen::Vector3f d = targets_[j] - queries[i];
-        const float squared = d.x() * d.x() + d.y() * d.y() + d.z() * d.z();
-        if (squared < best || (squared == best && best_index < 0)) {
-          best = squared;
-          best_index = static_cast<int32_t>(j);
-        }
-      }
-      distance[i] = best_index < 0 ? bound : std::min(bound, std::sqrt(best));
-      if (!index.empty()) index[i] = best_index;
-    }
-  });
+  impl_->query(make_blocks(queries), bound, distance, index);
+}
+
+void NearestNeighborIndex::query(const NearestNeighborIndex& queries, float bound,
+                                 std::span<float> distance, std::span<int32_t> index) const {
+  check(distance.size() == queries.size(), "nearest neighbors: one distance per query");
+  impl_->query(queries.impl_->blocks, bound, distance, index);
 }
 
 NearestNeighbors NearestNeighborIndex::query(std::span<const Eigen::Vector3f> queries,
@@ -46,11 +160,6 @@ NearestNeighbors NearestNeighborIndex::query(std::span<const Eigen::Vector3f> qu
   result.index.resize(queries.size());
   query(queries, bound, result.distance, result.index);
   return result;
-}
-
-void NearestNeighborIndex::query(const NearestNeighborIndex& queries, float bound,
-                                 std::span<float> distance, std::span<int32_t> index) const {
-  query(std::span(queries.targets_), bound, distance, index);
 }
 
 }  // namespace vggtcd

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// The nearest-neighbour search for AVX-512: 16 floats in one register.
+
+// g++ 12 takes the intrinsics' own "undefined" operands for mistakes (its bug 105593).
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#if !defined(__clang__)
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#endif
+#include <immintrin.h>
+#pragma GCC diagnostic pop
+
+#include <cstdint>
+
+#include "vggtcd/geometry/nearest_neighbors_kernel.h"
+
+namespace vggtcd {
+namespace {
+
+struct Avx512Lanes {
+  using Mask = __mmask16;
+  __m512 v;
+
+  static Avx512Lanes load(const float* aligned) { return {_mm512_load_ps(aligned)}; }
+  static Avx512Lanes all(float value) { return {_mm512_set1_ps(value)}; }
+  static uint32_t bits(Mask mask) { return mask; }
+  void store(float* aligned) const { _mm512_store_ps(aligned, v); }
+
+  friend Avx512Lanes operator+(Avx512Lanes a, Avx512Lanes b) { return {_mm512_add_ps(a.v, b.v)}; }
+  friend Avx512Lanes operator-(Avx512Lanes a, Avx512Lanes b) { return {_mm512_sub_ps(a.v, b.v)}; }
+  friend Avx512Lanes operator*(Avx512Lanes a, Avx512Lanes b) { return {_mm512_mul_ps(a.v, b.v)}; }
+  friend Avx512Lanes min(Avx512Lanes a, Avx512Lanes b) { return {_mm512_min_ps(a.v, b.v)}; }
+  friend Avx512Lanes max(Avx512Lanes a, Avx512Lanes b) { return {_mm512_max_ps(a.v, b.v)}; }
+  friend Avx512Lanes sqrt(Avx512Lanes a) { return {_mm512_sqrt_ps(a.v)}; }
+  friend float min_of(Avx512Lanes a) { return _mm512_reduce_min_ps(a.v); }
+  friend float max_of(Avx512Lanes a) { return _mm512_reduce_max_ps(a.v); }
+  friend Mask less(Avx512Lanes a, Avx512Lanes b) {
+    return _mm512_cmp_ps_mask(a.v, b.v, _CMP_LT_OQ);
+  }
+  friend Mask less_equal(Avx512Lanes a, Avx512Lanes b) {
+    return _mm512_cmp_ps_mask(a.v, b.v, _CMP_LE_OQ);
+  }
+  friend Mask equal(Avx512Lanes a, Avx512Lanes b) {
+    return _mm512_cmp_ps_mask(a.v, b.v, _CMP_EQ_OQ);
+  }
+  friend Avx512Lanes select(Mask where, Avx512Lanes yes, Avx512Lanes no) {
+    return {_mm512_mask_blend_ps(where, no.v, yes.v)};
+  }
+};
+
+}  // namespace
+
+void nearest_neighbors_avx512(const NearestNeighborTree& tree, const NearestNeighborQuery& query) {
+  PacketSearch<Avx512Lanes>(tree, query).run();
+}
+
+}  // namespace vggtcd

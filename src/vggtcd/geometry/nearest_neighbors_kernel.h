@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// The search itself, written once over a type V of 16 floats and compiled per instruction set:
+// 16 queries that are neighbours walk the tree of target boxes together. Internal to
+// geometry/nearest_neighbors*.cc, each of which gets its own copy (unnamed namespace), compiled
+// with its own flags.
+//
+// Why pruning is exact in floating point: rounding is monotone, so if a box contains a target p,
+// then for every axis fl(max(low - q, q - high, 0)) <= |fl(p - q)|, and the sums of squares,
+// evaluated in the same order without fused operations, keep that order. A box whose distance
+// exceeds a query's best cannot hold a better point.
+#pragma once
+
+#include "vggtcd/geometry/nearest_neighbors_tree.h"
+
+namespace vggtcd {
+namespace {
+
+constexpr int32_t kNoBlock = -1;
+constexpr int32_t kLowestIndexNotYetKnown = INT32_MAX;
+constexpr float kLargestFloat = 3.402823466e+38f;
+
+// V offers: load(const float*), all(float), store(float*), + - *, min, max, sqrt, less(V, V) and
+// less_equal(V, V) and equal(V, V) -> V::Mask, select(Mask, V, V), bits(Mask) -> uint32_t,
+// max_of(V), min_of(V).
+template <typename V>
+class PacketSearch {
+ public:
+  PacketSearch(const NearestNeighborTree& tree, const NearestNeighborQuery& query)
+      : tree_(tree), query_(query), want_index_(query.index != nullptr) {}
+
+  void run() {
+    int32_t seed = kNoBlock;
+    for (int64_t packet = 0; packet < query_.num_blocks; ++packet) {
+      start(query_.blocks[packet]);
+      // Where the previous packet ended is a good guess, and a good guess prunes most of the tree.
+      seed_ = seed;
+      if (seed != kNoBlock) visit_block(seed);
+      visit_node(tree_.num_levels - 1, 0);
+      finish();
+      if (best_block_[kNearestNeighborLanes - 1] != kNoBlock) {
+        seed = best_block_[kNearestNeighborLanes - 1];
+      }
+    }
+  }
+
+ private:
+  static V squared_length(V dx, V dy, V dz) { return (dx * dx + dy * dy) + dz * dz; }
+
+  void start(const PointBlock& queries) {
+    queries_ = &queries;
+    x_ = V::load(queries.x);
+    y_ = V::load(queries.y);
+    z_ = V::load(queries.z);
+    low_[0] = min_of(x_), low_[1] = min_of(y_), low_[2] = min_of(z_);
+    high_[0] = max_of(x_), high_[1] = max_of(y_), high_[2] = max_of(z_);
+    best_ = V::all(query_.squared_limit);
+    worst_ = query_.squared_limit;
+    for (int lane = 0; lane < kNearestNeighborLanes; ++lane) {
+      best_block_[lane] = kNoBlock;
+      best_index_[lane] = kLowestIndexNotYetKnown;
+    }
+    // Without indices an equally near target is of no interest: no index is below this.
+    worst_index_ = want_index_ ? kLowestIndexNotYetKnown : INT32_MIN;
+  }
+
+  // Whether a box at this distance can hold something that changes the result of some query.
+  bool matters(float squared_distance, int32_t min_index) const {
+    return squared_distance < worst_ || (squared_distance == worst_ && min_index < worst_index_);
+  }
+
+  // Squared distances between the packet's box and those of the 16 children.
+  V box_to_boxes(const BoxNode& node) const {
+    V d[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      const V above = V::load(node.low[axis]) - V::all(high_[axis]);
+      const V below = V::all(low_[axis]) - V::load(node.high[axis]);
+      d[axis] = max(max(above, below), V::all(0));
+    }
+    return squared_length(d[0], d[1], d[2]);
+  }
+
+  // Squared distances between the 16 queries and one child's box.
+  V queries_to_box(const BoxNode& node, int child) const {
+    const auto outside = [&](V q, int axis) {
+      return max(max(V::all(node.low[axis][child]) - q, q - V::all(node.high[axis][child])),
+                 V::all(0));
+    };
+    return squared_length(outside(x_, 0), outside(y_, 1), outside(z_, 2));
+  }
+
+  // The nearest child first; it usually settles most of the others.
+  void visit_node(int level, int64_t number) {
+    const BoxNode& node = tree_.levels[level][number];
+    const V distances = box_to_boxes(node);
+    uint32_t pending = V::bits(less_equal(distances, V::all(worst_)));
+    if (pending == 0) return;
+    alignas(64) float distance[kNearestNeighborLanes];
+    distances.store(distance);
+    if ((pending & (pending - 1)) != 0) {
+      const V nearest = V::all(min_of(distances));
+      const int child = __builtin_ctz(V::bits(equal(distances, nearest)));
+      pending &= ~(1u << child);
+      if (matters(distance[child], node.min_index[child])) visit_child(level, number, node, child);
+    }
+    for (; pending != 0; pending &= pending - 1) {
+      const int child = __builtin_ctz(pending);
+      if (matters(distance[child], node.min_index[child])) visit_child(level, number, node, child);
+    }
+  }
+
+  void visit_child(int level, int64_t number, const BoxNode& node, int child) {
+    const int64_t child_number = number * kNearestNeighborLanes + child;
+    if (level > 0) {
+      visit_node(level - 1, child_number);
+    } else if (child_number != seed_ &&
+               V::bits(less_equal(queries_to_box(node, child), best_)) != 0) {
+      visit_block(static_cast<int32_t>(child_number));
+    }
+  }
+
+  // All 16 targets of a block against all 16 queries.
+  void visit_block(int32_t number) {
+    const PointBlock& block = tree_.blocks[number];
+    V nearest = V::all(kLargestFloat);
+    for (int i = 0; i < kNearestNeighborLanes; ++i) {
+      nearest = min(nearest, squared_length(V::all(block.x[i]) - x_, V::all(block.y[i]) - y_,
+                                            V::all(block.z[i]) - z_));
+    }
+    const uint32_t equally_near = want_index_ ? V::bits(equal(nearest, best_)) : 0;
+    const auto nearer = less(nearest, best_);
+    if (const uint32_t lanes = V::bits(nearer); lanes != 0) {
+      best_ = select(nearer, nearest, best_);
+      worst_ = max_of(best_);
+      for (uint32_t rest = lanes; rest != 0; rest &= rest - 1) {
+        const int lane = __builtin_ctz(rest);
+        best_block_[lane] = number;
+        best_index_[lane] = kLowestIndexNotYetKnown;
+      }
+      if (want_index_) worst_index_ = kLowestIndexNotYetKnown;
+    }
+    if (equally_near != 0) settle_ties(number, equally_near);
+  }
+
+  // These queries have equally near targets in this block and in their best one.
+  void settle_ties(int32_t number, uint32_t lanes) {
+    alignas(64) float best[kNearestNeighborLanes];
+    best_.store(best);
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      if (best_block_[lane] == kNoBlock) continue;  // just beyond the bound
+      learn_lowest_index(lane, best[lane]);
+      const int32_t other = lowest_index_at(number, lane, best[lane]);
+      if (other < best_index_[lane]) best_index_[lane] = other;
+    }
+    worst_index_ = best_index_[0];
+    for (const int32_t index : best_index_)
+      worst_index_ = index > worst_index_ ? index : worst_index_;
+  }
+
+  void learn_lowest_index(int lane, float squared_distance) {
+    if (best_index_[lane] != kLowestIndexNotYetKnown) return;
+    best_index_[lane] = lowest_index_at(best_block_[lane], lane, squared_distance);
+  }
+
+  // The lowest index in a block at exactly this distance from one query.
+  int32_t lowest_index_at(int32_t number, int lane, float squared_distance) const {
+    const PointBlock& block = tree_.blocks[number];
+    const V d = squared_length(V::load(block.x) - V::all(queries_->x[lane]),
+                               V::load(block.y) - V::all(queries_->y[lane]),
+                               V::load(block.z) - V::all(queries_->z[lane]));
+    int32_t lowest = kLowestIndexNotYetKnown;
+    for (uint32_t hits = V::bits(equal(d, V::all(squared_distance))); hits != 0; hits &= hits - 1) {
+      const int32_t index = block.index[__builtin_ctz(hits)];
+      if (index < lowest) lowest = index;
+    }
+    return lowest;
+  }
+
+  void finish() {
+    alignas(64) float squared[kNearestNeighborLanes], distance[kNearestNeighborLanes];
+    best_.store(squared);
+    sqrt(best_).store(distance);
+    for (int lane = 0; lane < kNearestNeighborLanes; ++lane) {
+      const int32_t query = queries_->index[lane];
+      const bool found = best_block_[lane] != kNoBlock;
+      query_.distance[query] =
+          found && distance[lane] < query_.bound ? distance[lane] : query_.bound;
+      if (!want_index_) continue;
+      if (found) learn_lowest_index(lane, squared[lane]);
+      query_.index[query] = found ? best_index_[lane] : -1;
+    }
+  }
+
+  const NearestNeighborTree& tree_;
+  const NearestNeighborQuery& query_;
+  const bool want_index_;
+
+  // The packet: 16 queries and their bounding box.
+  const PointBlock* queries_ = nullptr;
+  V x_, y_, z_;
+  float low_[3], high_[3];
+
+  // Of each query: squared distance to its best target so far, the block that holds it, and its
+  // index, which is looked up late: only when a tie must be settled, or at the end.
+  V best_;
+  int32_t best_block_[kNearestNeighborLanes];
+  int32_t best_index_[kNearestNeighborLanes];
+  float worst_;          // the largest in best_
+  int32_t worst_index_;  // a box of equal distance matters if it holds an index below this
+  int32_t seed_ = kNoBlock;
+};
+
+}  // namespace
+}  // namespace vggtcd
