@@ -5,19 +5,28 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/nn/reference.h"
+#include "vggtcd/nn/row_kernels.h"
 
 namespace vggtcd {
 namespace {
 
 template <typename Out>
-void layer_norm(int64_t rows, int64_t channels, const float* x, int64_t x_stride,
-                const float* weight, const float* bias, float eps, Out* y, int64_t y_stride) {
-  check(rows >= 0 && channels >= 1, "layer_norm: shape");
-  check(x_stride >= channels && y_stride >= channels, "layer_norm: strides");
-  parallel_for(rows, 64, [&](int64_t begin, int64_t end) {
+void layer_norm(int64_t rows, const RowNorm& norm, const float* x, int64_t x_stride, Out* y,
+                int64_t y_stride) {
+  check(rows >= 0 && norm.channels >= 1, "layer_norm: shape");
+  check(x_stride >= norm.channels && y_stride >= norm.channels, "layer_norm: strides");
+  const RowKernels* kernels = row_kernels();
+  parallel_for(rows, 32, [&](int64_t begin, int64_t end) {
     for (int64_t row = begin; row < end; ++row) {
-      reference::layer_norm_row<float>(channels, x + row * x_stride, weight, bias, eps,
-                                       y + row * y_stride);
+      const float* from = x + row * x_stride;
+      Out* to = y + row * y_stride;
+      if (!kernels) {
+        reference::layer_norm_row<float>(norm.channels, from, norm.weight, norm.bias, norm.eps, to);
+      } else if constexpr (sizeof(Out) == 4) {
+        kernels->layer_norm_f32(norm, from, to);
+      } else {
+        kernels->layer_norm_bf16(norm, from, to);
+      }
     }
   });
 }
@@ -26,13 +35,13 @@ void layer_norm(int64_t rows, int64_t channels, const float* x, int64_t x_stride
 
 void layer_norm_f32(int64_t rows, int64_t channels, const float* x, int64_t x_stride,
                     const float* weight, const float* bias, float eps, float* y, int64_t y_stride) {
-  layer_norm(rows, channels, x, x_stride, weight, bias, eps, y, y_stride);
+  layer_norm(rows, RowNorm{channels, weight, bias, eps}, x, x_stride, y, y_stride);
 }
 
 void layer_norm_bf16(int64_t rows, int64_t channels, const float* x, int64_t x_stride,
                      const float* weight, const float* bias, float eps, uint16_t* y,
                      int64_t y_stride) {
-  layer_norm(rows, channels, x, x_stride, weight, bias, eps, y, y_stride);
+  layer_norm(rows, RowNorm{channels, weight, bias, eps}, x, x_stride, y, y_stride);
 }
 
 }  // namespace vggtcd

@@ -7,6 +7,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/nn/reference.h"
+#include "vggtcd/nn/row_kernels.h"
 
 namespace vggtcd {
 namespace {
@@ -37,6 +38,30 @@ void norm_rope_head(const QkNormRope& op, const float* weight, const float* bias
   for (int64_t c = 0; c < op.head_dim; ++c) head[c] = reference::store<T>(scratch[c]);
 }
 
+template <typename T>
+void norm_rope_row(const RowKernels& kernels, const QkNormRope& op, const RopePosition* position,
+                   T* q) {
+  HeadsNormRope heads{op.heads, op.head_dim, op.q_weight, op.q_bias, op.eps,
+                      nullptr,  nullptr,     nullptr,     nullptr};
+  if (op.rope) {
+    heads.cosines_y = op.rope->cosines(position->y);
+    heads.sines_y = op.rope->sines(position->y);
+    heads.cosines_x = op.rope->cosines(position->x);
+    heads.sines_x = op.rope->sines(position->x);
+  }
+  const auto run = [&kernels](const HeadsNormRope& of, T* row) {
+    if constexpr (sizeof(T) == 4) {
+      kernels.norm_rope_f32(of, row);
+    } else {
+      kernels.norm_rope_bf16(of, row);
+    }
+  };
+  run(heads, q);
+  heads.weight = op.k_weight;
+  heads.bias = op.k_bias;
+  run(heads, q + op.heads * op.head_dim);
+}
+
 void check_op(const QkNormRope& op, int64_t rows, int64_t row_stride) {
   check(rows >= 0 && op.heads >= 1 && op.head_dim >= 4 && op.head_dim % 4 == 0,
         "qk_norm_rope: shape");
@@ -57,16 +82,21 @@ void check_op(const QkNormRope& op, int64_t rows, int64_t row_stride) {
 template <typename T>
 void qk_norm_rope(const QkNormRope& op, int64_t rows, T* qkv, int64_t row_stride) {
   check_op(op, rows, row_stride);
-  const int64_t channels = op.heads * op.head_dim;
+  const RowKernels* kernels = row_kernels();
+  if (op.head_dim % kRopeMultiple != 0 || op.head_dim > kRopeLargestHead) kernels = nullptr;
   parallel_for(rows, 32, [&](int64_t begin, int64_t end) {
     std::vector<float> scratch(static_cast<size_t>(op.head_dim));
     for (int64_t row = begin; row < end; ++row) {
       const RopePosition* position = op.rope ? op.positions + row % op.position_count : nullptr;
       T* q = qkv + row * row_stride;
-      for (int64_t h = 0; h < op.heads; ++h) {
-        T* head = q + h * op.head_dim;
-        norm_rope_head(op, op.q_weight, op.q_bias, position, head, scratch.data());
-        norm_rope_head(op, op.k_weight, op.k_bias, position, head + channels, scratch.data());
+      if (kernels) {
+        norm_rope_row(*kernels, op, position, q);
+        continue;
+      }
+      for (int64_t h = 0; h < 2 * op.heads; ++h) {
+        norm_rope_head(op, h < op.heads ? op.q_weight : op.k_weight,
+                       h < op.heads ? op.q_bias : op.k_bias, position, q + h * op.head_dim,
+                       scratch.data());
       }
     }
   });

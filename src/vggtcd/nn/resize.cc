@@ -7,6 +7,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/nn/row_kernels.h"
 
 namespace vggtcd {
 namespace {
@@ -35,25 +36,56 @@ void check_shape(const ResizeShape& s) {
         "resize: shape");
 }
 
-// One output row of `channels` interleaved values per pixel, from the two input rows of its tap.
-void resize_row(const std::vector<Tap>& columns, int64_t channels, const float* low_row,
-                const float* high_row, float high_weight, const float* add, float* y) {
-  const float row_weight[2] = {1.0f - high_weight, high_weight};
-  for (const Tap& tap : columns) {
-    const float w00 = row_weight[0] * (1.0f - tap.high_weight);
-    const float w01 = row_weight[0] * tap.high_weight;
-    const float w10 = row_weight[1] * (1.0f - tap.high_weight);
-    const float w11 = row_weight[1] * tap.high_weight;
-    const float* x00 = low_row + tap.low * channels;
-    const float* x01 = low_row + tap.high * channels;
-    const float* x10 = high_row + tap.low * channels;
-    const float* x11 = high_row + tap.high * channels;
-    for (int64_t c = 0; c < channels; ++c) {
-      const float value = (w00 * x00[c] + w01 * x01[c]) + (w10 * x10[c] + w11 * x11[c]);
-      y[c] = add ? value + add[c] : value;
+// y = x0 + weight * (x1 - x0), + add if not null.
+void lerp(const RowKernels* kernels, int64_t size, const float* x0, const float* x1, float weight,
+          const float* add, float* y) {
+  if (kernels) return kernels->lerp(size, x0, x1, weight, add, y);
+  for (int64_t i = 0; i < size; ++i) {
+    const float value = x0[i] + weight * (x1[i] - x0[i]);
+    y[i] = add ? value + add[i] : value;
+  }
+}
+
+constexpr int64_t kChannelsAtOnce = 1024;
+
+// One output row of pixels of `channels` values from the two input rows of its tap: first between
+// the rows, then along them. Input pixels between rows are kept for as long as taps need them.
+void resize_row(const RowKernels* kernels, const std::vector<Tap>& columns, int64_t channels,
+                const float* low_row, const float* high_row, float high_weight, const float* add,
+                float* y) {
+  alignas(64) float pixels[2][kChannelsAtOnce];  // input column i at i % 2
+  for (int64_t c = 0; c < channels; c += kChannelsAtOnce) {
+    const int64_t count = std::min(kChannelsAtOnce, channels - c);
+    int64_t done = -1;  // input columns up to this one are between rows
+    for (size_t i = 0; i < columns.size(); ++i) {
+      const Tap& tap = columns[i];
+      for (done = std::max(done, tap.low - 1); done < tap.high;) {
+        ++done;
+        const int64_t at = done * channels + c;
+        lerp(kernels, count, low_row + at, high_row + at, high_weight, nullptr, pixels[done % 2]);
+      }
+      const int64_t at = static_cast<int64_t>(i) * channels + c;
+      lerp(kernels, count, pixels[tap.low % 2], pixels[tap.high % 2], tap.high_weight,
+           add ? add + at : nullptr, y + at);
     }
-    y += channels;
-    if (add) add += channels;
+  }
+}
+
+// The same for one plane, where a pixel is one value: between the rows in pieces, then along.
+void resize_plane_row(const RowKernels* kernels, const std::vector<Tap>& columns, int64_t in_width,
+                      const float* low_row, const float* high_row, float high_weight,
+                      const float* add, float* y) {
+  constexpr int64_t kPiece = 4096;
+  float between[kPiece + 1];
+  size_t i = 0;
+  for (int64_t first = 0; i < columns.size(); first += kPiece) {
+    const int64_t count = std::min(kPiece + 1, in_width - first);
+    lerp(kernels, count, low_row + first, high_row + first, high_weight, nullptr, between);
+    for (; i < columns.size() && columns[i].high < first + count; ++i) {
+      const float low = between[columns[i].low - first], high = between[columns[i].high - first];
+      const float value = low + columns[i].high_weight * (high - low);
+      y[i] = add ? value + add[i] : value;
+    }
   }
 }
 
@@ -66,11 +98,13 @@ void resize_bilinear_channels_last(const ResizeShape& shape, const float* x, flo
   const std::vector<Tap> columns = make_taps(shape.in_width, shape.out_width);
   const int64_t in_stride = shape.in_width * shape.channels;
   const int64_t out_stride = shape.out_width * shape.channels;
-  parallel_for(shape.out_height, 1, [&](int64_t begin, int64_t end) {
+  const RowKernels* kernels = row_kernels();
+  parallel_for(shape.out_height, 4, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const Tap& tap = rows[static_cast<size_t>(i)];
-      resize_row(columns, shape.channels, x + tap.low * in_stride, x + tap.high * in_stride,
-                 tap.high_weight, add ? add + i * out_stride : nullptr, y + i * out_stride);
+      resize_row(kernels, columns, shape.channels, x + tap.low * in_stride,
+                 x + tap.high * in_stride, tap.high_weight, add ? add + i * out_stride : nullptr,
+                 y + i * out_stride);
     }
   });
 }
@@ -79,13 +113,15 @@ void resize_bilinear_planar(const ResizeShape& shape, const float* x, float* y, 
   check_shape(shape);
   const std::vector<Tap> rows = make_taps(shape.in_height, shape.out_height);
   const std::vector<Tap> columns = make_taps(shape.in_width, shape.out_width);
-  parallel_for(shape.channels * shape.out_height, 8, [&](int64_t begin, int64_t end) {
+  const RowKernels* kernels = row_kernels();
+  parallel_for(shape.channels * shape.out_height, 64, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const Tap& tap = rows[static_cast<size_t>(i % shape.out_height)];
       const float* plane = x + i / shape.out_height * shape.in_height * shape.in_width;
       const int64_t at = i * shape.out_width;
-      resize_row(columns, 1, plane + tap.low * shape.in_width, plane + tap.high * shape.in_width,
-                 tap.high_weight, add ? add + at : nullptr, y + at);
+      resize_plane_row(kernels, columns, shape.in_width, plane + tap.low * shape.in_width,
+                       plane + tap.high * shape.in_width, tap.high_weight, add ? add + at : nullptr,
+                       y + at);
     }
   });
 }

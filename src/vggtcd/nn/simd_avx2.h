@@ -28,6 +28,7 @@ struct Avx2 {
   static V fnma(V a, V b, V c) { return _mm256_fnmadd_ps(a, b, c); }  // c - a * b
   static V max(V a, V b) { return _mm256_max_ps(a, b); }              // b where either is NaN
   static V min(V a, V b) { return _mm256_min_ps(a, b); }              // b where either is NaN
+  static V sqrt(V a) { return _mm256_sqrt_ps(a); }
   static V abs(V a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a); }
   static V round(V a) { return _mm256_round_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
   static V ceil(V a) { return _mm256_round_ps(a, _MM_FROUND_TO_POS_INF | _MM_FROUND_NO_EXC); }
@@ -47,6 +48,7 @@ struct Avx2 {
   // Of the first n floats (0 <= n <= kLanes); the others read as 0, and are not written.
   static V load_first(const float* p, int64_t n) { return _mm256_maskload_ps(p, first(n)); }
   static void store_first(float* p, V a, int64_t n) { _mm256_maskstore_ps(p, first(n), a); }
+  static V keep_first(V a, int64_t n) { return _mm256_and_ps(a, _mm256_castsi256_ps(first(n))); }
   // The same from and to bfloat16: exact, and rounded to nearest even with NaN kept.
   static V load_bf16(const uint16_t* p) {
     return widen(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));

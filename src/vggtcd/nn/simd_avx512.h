@@ -35,6 +35,7 @@ struct Avx512 {
   static V fnma(V a, V b, V c) { return _mm512_fnmadd_ps(a, b, c); }  // c - a * b
   static V max(V a, V b) { return _mm512_max_ps(a, b); }              // b where either is NaN
   static V min(V a, V b) { return _mm512_min_ps(a, b); }              // b where either is NaN
+  static V sqrt(V a) { return _mm512_sqrt_ps(a); }
   static V abs(V a) { return _mm512_abs_ps(a); }
   static V round(V a) {
     return _mm512_roundscale_ps(a, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
@@ -50,6 +51,7 @@ struct Avx512 {
   // Of the first n floats (0 <= n <= kLanes); the others read as 0, and are not written.
   static V load_first(const float* p, int64_t n) { return _mm512_maskz_loadu_ps(first(n), p); }
   static void store_first(float* p, V a, int64_t n) { _mm512_mask_storeu_ps(p, first(n), a); }
+  static V keep_first(V a, int64_t n) { return _mm512_maskz_mov_ps(first(n), a); }
   // The same from and to bfloat16: exact, and rounded to nearest even with NaN kept.
   static V load_bf16(const uint16_t* p) {
     return widen(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));

@@ -50,16 +50,17 @@ inline typename S::V gelu_f32(typename S::V x) {
   // Below -1000 the exponential is 0 anyway; the bound keeps an infinity out of exp2.
   const auto square = S::mul(a, S::mul(a, S::set(-0.72134752f)));  // log2(e) / 2
   const auto tail = S::mul(S::mul(p, t), exp2_f32<S>(S::max(S::set(-1000.0f), square)));
-  const auto signed_tail = S::mul(x, tail);
-  return S::select_greater(x, S::zero(), S::sub(x, signed_tail), signed_tail);
+  const auto phi = S::select_greater(x, S::zero(), S::sub(S::set(1.0f), tail), tail);
+  return S::mul(x, phi);
 }
 
 // x / (1 + exp(-x)).
 template <typename S>
 inline typename S::V silu_f32(typename S::V x) {
-  const auto exponent = S::mul(x, S::set(-1.44269504f));
-  const auto bounded = S::min(S::set(127.0f), S::max(S::set(-1000.0f), exponent));
-  return S::div(x, S::add(S::set(1.0f), exp2_f32<S>(bounded)));
+  const auto exponent = S::mul(S::abs(x), S::set(-1.44269504f));  // log2(e)
+  const auto e = exp2_f32<S>(S::max(S::set(-1000.0f), exponent));
+  const auto numerator = S::select_greater(x, S::zero(), S::set(1.0f), e);
+  return S::mul(x, S::div(numerator, S::add(S::set(1.0f), e)));
 }
 
 }  // namespace
