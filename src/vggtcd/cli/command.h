@@ -33,6 +33,7 @@ CLI::App* add_command(Program& program, CLI::App& parent, const std::string& nam
                       const std::string& description, Action run);
 
 // The subcommands, one .cc each, in the order of --help.
+void add_synthesize(Program& program);
 
 // The flag of a field: static_factor -> --static-factor.
 std::string flag_of(std::string_view field);

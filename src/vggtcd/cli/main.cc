@@ -27,6 +27,7 @@ int run(int argc, char** argv) {
   program.app.require_subcommand(1);
   program.app.footer(
       "'vggt-cd COMMAND --help' explains a command. Exit statuses: docs/formats.md.");
+  add_synthesize(program);
   try {
     program.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writing generated scenes. Every file's bytes depend on the options alone.
+#include "vggtcd/evaluation/synthetic/dataset.h"
+
+#include <Eigen/Geometry>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/evaluation/synthetic/truth_file.h"
+#include "vggtcd/geometry/umeyama.h"
+#include "vggtcd/io/jpeg.h"
+#include "vggtcd/io/predictions.h"
+#include "vggtcd/scene/confidence.h"
+#include "vggtcd/scene/point_cloud.h"
+
+namespace vggtcd {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kEpochFolder[] = {"before", "after"};
+
+void make_directory(const fs::path& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) {
+    throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", path.string(), error.message());
+  }
+}
+
+// The pass's own fit to the world: every 7th confident pixel of unchanged surface.
+Sim3 world_from_pass(const EpochTruth& truth, const Reconstruction& pass) {
+  const float threshold = confidence_threshold(pass);
+  std::vector<Eigen::Vector3d> predicted, true_points;
+  const size_t width = static_cast<size_t>(truth.width);
+  for (size_t pixel = 0; pixel < pass.num_pixels(); pixel += 7) {
+    if (pass.confidence[pixel] <= threshold || truth.label[pixel] != kLabelUnchanged) continue;
+    const View& view = truth.views[pixel / truth.pixels_per_frame()];
+    const size_t in_frame = pixel % truth.pixels_per_frame();
+    predicted.push_back(unproject_pixel(pass, static_cast<uint32_t>(pixel)).cast<double>());
+    true_points.push_back(view.camera_from_world.inverse() *
+                          view.pinhole.unproject(static_cast<double>(in_frame % width),
+                                                 static_cast<double>(in_frame / width),
+                                                 truth.depth_m[pixel]));
+  }
+  const UmeyamaResult fit = umeyama(predicted, true_points);
+  check(fit.determined(), "best_t2_from_t1: a pass that does not determine a similarity");
+  return fit.y_from_x;
+}
+
+}  // namespace
+
+void SynthesizeOptions::validate() const {
+  check_field(keyframes >= 2, "keyframes", keyframes, "at least 2");
+  check_field(jpeg_quality >= 1 && jpeg_quality <= 100, "jpeg_quality", jpeg_quality, "1 to 100");
+  check_field(photos || !wat, "wat", wat, "no-wat when photos are not written");
+  render.validate();
+  errors.validate();
+}
+
+Sim3 best_t2_from_t1(const SceneTruth& truth, const Reconstruction& t1, const Reconstruction& t2) {
+  return world_from_pass(truth.of(Epoch::kT2), t2).inverse() *
+         world_from_pass(truth.of(Epoch::kT1), t1);
+}
+
+void synthesize(const fs::path& directory, const SynthesizeOptions& options,
+                ProgressSink& progress) {
+  options.validate();
+  const SyntheticScene scene = make_scene(options.scene, options.seed);
+  std::error_code ignored;
+  if (fs::exists(directory, ignored) && !fs::is_empty(directory, ignored)) {
+    throw_error(ErrorCode::kOutput, "{}: expected a new or empty directory, found files in it",
+                directory.string());
+  }
+  for (const char* folder : kEpochFolder) {
+    make_directory(options.photos ? directory / folder : directory);
+  }
+  const SceneTruth truth =
+      render(scene, options.render, progress, [&](Epoch which, int frame, const Image& photo) {
+        if (!options.photos) return;
+        write_jpeg(
+            directory / kEpochFolder[static_cast<int>(which)] / fmt::format("{:04d}.jpg", frame),
+            photo, options.jpeg_quality);
+      });
+  const SimulatedPredictions predictions =
+      simulate_predictions(scene, truth, options.keyframes, options.errors);
+  write_reconstruction(directory / "t1.npz", predictions.t1.reconstruction);
+  write_reconstruction(directory / "t2.npz", predictions.t2.reconstruction);
+  write_joint(directory / "joint.npz", predictions.joint);
+  write_truth(directory, scene, truth, options, predictions);
+}
+
+}  // namespace vggtcd

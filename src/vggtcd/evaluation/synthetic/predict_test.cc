@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// The error model: nothing without errors, and each promise of docs/synthetic.md.
+#include "vggtcd/evaluation/synthetic/predict.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "vggtcd/evaluation/synthetic/dataset.h"
+#include "vggtcd/scene/point_cloud.h"
+
+namespace vggtcd {
+namespace {
+
+struct Case {
+  SyntheticScene scene = make_scene("worktop", 4);
+  SceneTruth truth;
+  Case() {
+    RenderOptions options;
+    options.frames = 10;
+    options.width = 130;
+    options.photo_scale = 1;
+    options.samples = 1;
+    truth = render(scene, options, silent_progress());
+  }
+};
+const Case& fixture() {
+  static const Case instance;
+  return instance;
+}
+
+ErrorModel no_errors() {
+  ErrorModel errors;
+  for_each_field(errors, [](std::string_view, double& value, std::string_view) { value = 0; });
+  return errors;
+}
+
+Eigen::Vector3d true_point(const EpochTruth& truth, size_t pixel) {
+  const View& view = truth.views[pixel / truth.pixels_per_frame()];
+  const size_t in_frame = pixel % truth.pixels_per_frame();
+  const size_t width = static_cast<size_t>(truth.width);
+  return view.camera_from_world.inverse() *
+         view.pinhole.unproject(static_cast<double>(in_frame % width),
+                                static_cast<double>(in_frame / width), truth.depth_m[pixel]);
+}
+
+TEST(SimulatePass, WithoutErrorsIsTheTruthInItsOwnFrame) {
+  const auto& [scene, truth] = fixture();
+  SimulatedPredictions p = simulate_predictions(scene, truth, 3, no_errors());
+  EXPECT_NEAR(p.t2_from_t1().scale, scene.scale_t2_from_t1, 1e-12);
+  for (const Epoch which : kEpochs) {
+    SimulatedPass& pass = which == Epoch::kT1 ? p.t1 : p.t2;
+    // The first camera is the origin.
+    EXPECT_LT(camera_center(pass.reconstruction.views[0].camera_from_world).norm(), 1e-12);
+    // Undo the network's half pixel.
+    for (View& view : pass.reconstruction.views) {
+      view.pinhole.cx -= 0.5;
+      view.pinhole.cy -= 0.5;
+    }
+    const EpochTruth& epoch = truth.of(which);
+    for (size_t pixel = 0; pixel < epoch.depth_m.size(); pixel += 101) {
+      const Eigen::Vector3d expected = pass.pass_from_world * true_point(epoch, pixel);
+      const auto actual = unproject_pixel(pass.reconstruction, static_cast<uint32_t>(pixel));
+      EXPECT_LT((actual.cast<double>() - expected).norm(), 1e-5);  // floats of a few units
+    }
+  }
+}
+
+TEST(SimulatePass, BestFitIsTheNominalSim3WithoutErrors) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors = no_errors();
+  errors.confidence_noise = 0.3;  // else most confidences tie
+  const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
+  const Sim3 best = best_t2_from_t1(truth, p.t1.reconstruction, p.t2.reconstruction);
+  const Sim3 off = best * p.t2_from_t1().inverse();
+  // What is left is half a pixel of principal point, 1/210 of the depth.
+  EXPECT_NEAR(off.scale, 1, 2e-3);
+  EXPECT_LT(rotation_angle_rad(off.rotation), 5e-3);
+  EXPECT_LT(off.translation.norm(), 5e-3);
+}
+
+TEST(SimulatePass, EachPassDrawsItsOwnErrors) {
+  const auto& [scene, truth] = fixture();
+  const SimulatedPredictions p = simulate_predictions(scene, truth, 3, ErrorModel{});
+  // Frame 0 of T1 is frame 0 of the joint pass too; scales differ, so compare depth ratios.
+  const float scale = p.joint.reconstruction.depth[0] / p.t1.reconstruction.depth[0];
+  double spread = 0;
+  for (size_t pixel = 0; pixel < truth.of(Epoch::kT1).pixels_per_frame(); ++pixel) {
+    const double ratio = p.joint.reconstruction.depth[pixel] / p.t1.reconstruction.depth[pixel];
+    spread = std::max(spread, std::abs(ratio / scale - 1));
+  }
+  EXPECT_GT(spread, 0.01);
+}
+
+// Rank correlation by Spearman.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto ranks = [](const std::vector<double>& values) {
+    std::vector<size_t> order(values.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](size_t x, size_t y) { return values[x] < values[y]; });
+    std::vector<double> rank(values.size());
+    for (size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<double>(k);
+    return rank;
+  };
+  const std::vector<double> ra = ranks(a), rb = ranks(b);
+  const double mean = 0.5 * static_cast<double>(a.size() - 1);
+  double cross = 0, square = 0;
+  for (size_t k = 0; k < a.size(); ++k) {
+    cross += (ra[k] - mean) * (rb[k] - mean);
+    square += (ra[k] - mean) * (ra[k] - mean);
+  }
+  return cross / square;
+}
+
+TEST(SimulatePass, ConfidenceAnticorrelatesWithErrorButDoesNotTellIt) {
+  const auto& [scene, truth] = fixture();
+  const SimulatedPredictions p = simulate_predictions(scene, truth, 3, ErrorModel{});
+  const EpochTruth& epoch = truth.of(Epoch::kT1);
+  std::vector<double> errors, confidences;
+  for (size_t pixel = 0; pixel < epoch.depth_m.size(); ++pixel) {
+    const double depth = p.t1.reconstruction.depth[pixel] / p.t1.pass_from_world.scale;
+    errors.push_back(std::abs(std::log(depth / epoch.depth_m[pixel])));
+    confidences.push_back(p.t1.reconstruction.confidence[pixel]);
+    EXPECT_GE(confidences.back(), 1.0);
+  }
+  const double correlation = rank_correlation(errors, confidences);
+  EXPECT_LT(correlation, -0.2);
+  EXPECT_GT(correlation, -0.85);
+}
+
+TEST(SimulatePass, EdgesHavePointsThatFlyBetweenFrontAndBack) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors = no_errors();
+  errors.edge_blur_px = 1.5;
+  const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
+  const EpochTruth& epoch = truth.of(Epoch::kT1);
+  int flying = 0, altered_inside = 0;
+  const int w = epoch.width;
+  for (int v = 2; v < epoch.height - 2; ++v) {
+    for (int u = 2; u < w - 2; ++u) {
+      const auto at_pixel = [&](int du, int dv) {
+        return epoch.depth_m[static_cast<size_t>((v + dv) * w + u + du)];
+      };
+      float low = at_pixel(0, 0), high = low;
+      for (int dv = -2; dv <= 2; ++dv) {
+        for (int du = -2; du <= 2; ++du) {
+          low = std::min(low, at_pixel(du, dv));
+          high = std::max(high, at_pixel(du, dv));
+        }
+      }
+      const double depth =
+          p.t1.reconstruction.depth[static_cast<size_t>(v * w + u)] / p.t1.pass_from_world.scale;
+      if (high > 1.3f * low) flying += depth > 1.1 * low && depth < high / 1.1 ? 1 : 0;
+      if (high < 1.03f * low) altered_inside += std::abs(depth / at_pixel(0, 0) - 1) > 1e-5 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(flying, 30);
+  EXPECT_EQ(altered_inside, 0);
+}
+
+TEST(SimulatePass, OutlierFramesAreFarOffAndLessSure) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors;
+  errors.outlier_share = 0.5;
+  const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
+  const SimulatedPredictions calm = [&] {
+    ErrorModel none = errors;
+    none.outlier_share = 0;
+    return simulate_predictions(scene, truth, 3, none);
+  }();
+  int outliers = 0;
+  for (size_t frame = 0; frame < 10; ++frame) {
+    const auto eye = [&](const SimulatedPredictions& q) {
+      return camera_center(q.t1.reconstruction.views[frame].camera_from_world);
+    };
+    const double moved = (eye(p) - eye(calm)).norm() / p.t1.pass_from_world.scale;
+    if (moved > 1e-9) {
+      ++outliers;
+      const auto mean = [&](const SimulatedPredictions& q) {
+        const auto values = q.t1.reconstruction.frame_confidence(static_cast<int>(frame));
+        return std::accumulate(values.begin(), values.end(), 0.0);
+      };
+      EXPECT_LT(mean(p), mean(calm));
+    }
+  }
+  EXPECT_GE(outliers, 2);
+  EXPECT_LE(outliers, 8);
+}
+
+}  // namespace
+}  // namespace vggtcd

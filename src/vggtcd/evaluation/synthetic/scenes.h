@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// The eleven scenes, one function each; make_scene (scene.h) finds them by name.
+#pragma once
+
+#include "vggtcd/evaluation/synthetic/scene_builder.h"
+
+namespace vggtcd {
+
+// What a scene function fills in besides the objects.
+struct WalkPlan {
+  Eigen::Vector3d centre_m{0, 0, 1};  // looked at
+  double radius_m = 4;
+  double from_deg = 0, to_deg = 120;  // direction of the eye from the centre
+  double height_m = 1.6;
+};
+// Walks around the centre, the radius, height and target wavering by a few percent.
+CameraPath arc_path(Random& random, const WalkPlan& plan);
+// Walks from one point to another looking at points beside the way.
+CameraPath line_path(Random& random, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m,
+                     const Eigen::Vector3d& look_from_m, const Eigen::Vector3d& look_to_m);
+
+void build_driveway(SceneBuilder& b);
+void build_courtyard(SceneBuilder& b);
+void build_barbecue(SceneBuilder& b);
+void build_poolside(SceneBuilder& b);
+void build_street(SceneBuilder& b);
+
+void build_coffee_corner(SceneBuilder& b);
+void build_hallway(SceneBuilder& b);
+void build_kitchen(SceneBuilder& b);
+void build_living_room(SceneBuilder& b);
+void build_desk(SceneBuilder& b);
+void build_worktop(SceneBuilder& b);
+
+}  // namespace vggtcd

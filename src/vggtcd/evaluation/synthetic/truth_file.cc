@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+// Writing what is true.
+#include "vggtcd/evaluation/synthetic/truth_file.h"
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "vggtcd/io/npz.h"
+#include "vggtcd/io/output_file.h"
+
+namespace vggtcd {
+namespace {
+
+using nlohmann::ordered_json;
+
+// Arrays in the shapes that NumPy users expect. They must live until the writer is finished.
+struct EpochArrays {
+  std::vector<double> extrinsic, intrinsic;
+  std::vector<int32_t> instance;
+  std::vector<uint8_t> change_class, unseen;
+};
+
+EpochArrays make_arrays(const SyntheticScene& scene, const EpochTruth& truth) {
+  EpochArrays arrays;
+  for (const View& view : truth.views) {
+    const Eigen::Matrix3d intrinsic = view.pinhole.matrix();
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        arrays.extrinsic.push_back(view.camera_from_world.rotation(row, column));
+        arrays.intrinsic.push_back(intrinsic(row, column));
+      }
+      arrays.extrinsic.push_back(view.camera_from_world.translation[row]);
+    }
+  }
+  for (size_t pixel = 0; pixel < truth.object.size(); ++pixel) {
+    const int object = truth.object[pixel];
+    arrays.instance.push_back(object);
+    arrays.change_class.push_back(
+        object == 0
+            ? kLabelVoid
+            : static_cast<uint8_t>(scene.objects[static_cast<size_t>(object - 1)].change()));
+    arrays.unseen.push_back(object == 0 || truth.other_looked[pixel] ? 0 : 1);
+  }
+  return arrays;
+}
+
+void add_arrays(NpzWriter& writer, const std::string& epoch, const EpochTruth& truth,
+                const EpochArrays& arrays) {
+  const int64_t s = truth.num_frames(), h = truth.height, w = truth.width;
+  writer.add<double>("extrinsic_" + epoch, {s, 3, 4}, arrays.extrinsic);
+  writer.add<double>("intrinsic_" + epoch, {s, 3, 3}, arrays.intrinsic);
+  writer.add<float>("depth_" + epoch, {s, h, w}, truth.depth_m);
+  writer.add<uint8_t>("changed_" + epoch, {s, h, w}, truth.label);
+  writer.add<uint8_t>("change_class_" + epoch, {s, h, w}, arrays.change_class);
+  writer.add<int32_t>("instance_" + epoch, {s, h, w}, arrays.instance);
+  writer.add_mask("unseen_by_other_" + epoch, {s, h, w}, arrays.unseen);
+}
+
+ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+ordered_json json_of(const Eigen::Matrix3d& m) {
+  ordered_json rows;
+  for (int row = 0; row < 3; ++row) rows.push_back(json_of(Eigen::Vector3d(m.row(row))));
+  return rows;
+}
+ordered_json json_of(const Sim3& sim3) {
+  return {{"scale", sim3.scale},
+          {"rotation", json_of(sim3.rotation)},
+          {"translation", json_of(sim3.translation)}};
+}
+
+// The box of an object in world axes: centre, rotation (columns are its axes) and size.
+ordered_json box_of(const SceneObject& object, const Rigid3& world_from_object) {
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e30), high = -low;
+  for (const Mesh::Vertex& vertex : object.mesh.vertices) {
+    low = low.cwiseMin(vertex.position_m.cast<double>());
+    high = high.cwiseMax(vertex.position_m.cast<double>());
+  }
+  return {{"center_m", json_of(Eigen::Vector3d(world_from_object * (0.5 * (low + high))))},
+          {"rotation", json_of(world_from_object.rotation)},
+          {"size_m", json_of(Eigen::Vector3d(high - low))}};
+}
+
+// How often an object appears: pixels that are evaluated as changed, per epoch.
+std::vector<int64_t> changed_pixels(const SyntheticScene& scene, const EpochTruth& truth) {
+  std::vector<int64_t> count(scene.objects.size() + 1);
+  for (size_t pixel = 0; pixel < truth.object.size(); ++pixel) {
+    if (truth.label[pixel] == kLabelChanged) ++count[truth.object[pixel]];
+  }
+  return count;
+}
+
+ordered_json objects_json(const SyntheticScene& scene, const SceneTruth& truth) {
+  const std::vector<int64_t> pixels[] = {changed_pixels(scene, truth.of(Epoch::kT1)),
+                                         changed_pixels(scene, truth.of(Epoch::kT2))};
+  ordered_json list = ordered_json::array();
+  for (size_t k = 0; k < scene.objects.size(); ++k) {
+    const SceneObject& object = scene.objects[k];
+    if (object.change() == ObjectChange::kUnchanged) continue;
+    ordered_json entry{
+        {"instance", k + 1}, {"name", object.name}, {"class", enum_to_string(object.change())}};
+    for (const Epoch which : kEpochs) {
+      const int e = static_cast<int>(which);
+      const auto& pose = object.world_from_object[e];
+      const std::string suffix = e == 0 ? "_t1" : "_t2";
+      entry["box" + suffix] = pose ? box_of(object, *pose) : ordered_json();
+      entry["changed_pixels" + suffix] = pixels[e][k + 1];
+    }
+    list.push_back(std::move(entry));
+  }
+  return list;
+}
+
+double changed_share(const SceneTruth& truth) {
+  int64_t changed = 0, surface = 0;
+  for (const EpochTruth& epoch : truth.epoch) {
+    for (size_t pixel = 0; pixel < epoch.label.size(); ++pixel) {
+      surface += epoch.object[pixel] != 0;
+      changed += epoch.label[pixel] == kLabelChanged;
+    }
+  }
+  return static_cast<double>(changed) / static_cast<double>(std::max<int64_t>(1, surface));
+}
+
+template <typename Options>
+ordered_json options_json(const Options& options) {
+  ordered_json result;
+  for_each_field(options, [&](std::string_view name, const auto& value, std::string_view) {
+    if constexpr (requires { std::remove_cvref_t<decltype(value)>::fields; }) {
+      result[std::string(name)] = options_json(value);
+    } else {
+      result[std::string(name)] = value;
+    }
+  });
+  return result;
+}
+
+}  // namespace
+
+void write_truth(const std::filesystem::path& directory, const SyntheticScene& scene,
+                 const SceneTruth& truth, const SynthesizeOptions& options,
+                 const SimulatedPredictions& predictions) {
+  const Sim3 nominal = predictions.t2_from_t1();
+  const Sim3 best =
+      best_t2_from_t1(truth, predictions.t1.reconstruction, predictions.t2.reconstruction);
+  const EpochArrays t1 = make_arrays(scene, truth.of(Epoch::kT1));
+  const EpochArrays t2 = make_arrays(scene, truth.of(Epoch::kT2));
+  NpzWriter writer(directory / "truth.npz", NpzCompression::kDeflate);
+  add_arrays(writer, "t1", truth.of(Epoch::kT1), t1);
+  add_arrays(writer, "t2", truth.of(Epoch::kT2), t2);
+  const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation = nominal.rotation;
+  writer.add<double>("scale", {}, std::span(&nominal.scale, 1));
+  writer.add<double>("rotation", {3, 3}, std::span(rotation.data(), 9));
+  writer.add<double>("translation", {3}, std::span(nominal.translation.data(), 3));
+  writer.finish();
+
+  const ordered_json json{
+      {"scene", scene.name},
+      {"outdoor", scene.outdoor},
+      {"options", options_json(options)},
+      {"extent_m", truth.extent_m},
+      {"changed_share", changed_share(truth)},
+      {"t2_from_t1", json_of(nominal)},
+      {"t2_from_t1_best_fit", json_of(best)},
+      {"t1_from_world", json_of(predictions.t1.pass_from_world)},
+      {"t2_from_world", json_of(predictions.t2.pass_from_world)},
+      {"joint_from_world", json_of(predictions.joint_from_world)},
+      {"objects", objects_json(scene, truth)},
+  };
+  write_text_file(directory / "truth.json", json.dump(1) + "\n");
+}
+
+}  // namespace vggtcd
