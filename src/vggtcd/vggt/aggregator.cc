@@ -73,7 +73,7 @@ void Aggregator::insert_special_tokens(const AggregatedTokens& shape, const Rows
 }
 
 AggregatedTokens Aggregator::forward(const ImageBatch& images, const Trace& trace,
-                                     const std::function<void(const char*)>& after_block) const {
+                                     const std::function<void(VggtStage)>& after_block) const {
   const int64_t channels = config_.channels;
   AggregatedTokens out;
   out.frames = images.frames;
@@ -92,7 +92,7 @@ AggregatedTokens Aggregator::forward(const ImageBatch& images, const Trace& trac
 
   // patch_tokens = self.patch_embed(images)["x_norm_patchtokens"]
   patch_embed_.forward(images, x, out.tokens(), out.special, workspace, trace,
-                       [&] { after_block("patch embed"); });
+                       [&] { after_block(VggtStage::kPatchEmbed); });
   show_patches(trace, out, x);
   insert_special_tokens(out, x);
 
@@ -114,12 +114,12 @@ AggregatedTokens Aggregator::forward(const ImageBatch& images, const Trace& trac
     // tokens = self._process_frame_attention(tokens, ...)
     frame_blocks_[i].forward(x, out.frames, out.tokens(), &rope, &positions, workspace);
     show("frame", layer);
-    after_block("frame attention");
+    after_block(VggtStage::kFrameAttention);
     if (keep_this) keep(x, rows, channels, target, 0);
     // tokens = self._process_global_attention(tokens, ...)
     global_blocks_[i].forward(x, 1, rows, &rope, &positions, workspace);
     show("global", layer);
-    after_block("global attention");
+    after_block(VggtStage::kGlobalAttention);
     if (!keep_this) continue;
     // concat_inter = cat(frame_intermediates, global_intermediates)
     keep(x, rows, channels, target, channels);

@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "vggtcd/vggt/cost.h"
 #include "vggtcd/vggt/patch_embed.h"
 
 namespace vggtcd {
@@ -31,10 +32,10 @@ class Aggregator {
   // scope: aggregator.
   Aggregator(const WeightScope& scope, const VggtConfig& config, DType compute);
 
-  // after_block is called after each block of the ViT, of frame and of global attention with the
-  // name of that stage.
+  // after_block is called after each block of the ViT, of frame and of global attention with its
+  // stage.
   AggregatedTokens forward(const ImageBatch& images, const Trace& trace,
-                           const std::function<void(const char*)>& after_block) const;
+                           const std::function<void(VggtStage)>& after_block) const;
 
  private:
   void insert_special_tokens(const AggregatedTokens& shape, const Rows& x) const;

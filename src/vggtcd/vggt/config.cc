@@ -21,6 +21,17 @@ const std::vector<int64_t>& shape_of(const WeightScope& scope, std::string_view 
   return shape;
 }
 
+void read_dense_shapes(const WeightScope& head, const std::string& source, VggtConfig& config) {
+  const WeightScope scratch = head.at("scratch");
+  config.dpt_features = shape_of(scratch, "layer1_rn.weight", 4, source)[0];
+  for (size_t level = 0; level < 4; ++level) {
+    config.dpt_channels[level] =
+        shape_of(head, fmt::format("projects.{}.weight", level), 4, source)[0];
+  }
+  config.dpt_output_channels[0] = shape_of(scratch, "output_conv1.weight", 4, source)[0];
+  config.dpt_output_channels[1] = shape_of(scratch, "output_conv2.0.weight", 4, source)[0];
+}
+
 void read_shapes(const WeightStore& store, VggtConfig& config) {
   const WeightScope aggregator = store.root().at("aggregator");
   const WeightScope vit = aggregator.at("patch_embed");
@@ -39,6 +50,13 @@ void read_shapes(const WeightStore& store, VggtConfig& config) {
   config.register_tokens = shape_of(aggregator, "register_token", 4, source)[2];
   config.vit_depth = vit.count("blocks", "norm1.weight");
   config.depth = aggregator.count("frame_blocks", "norm1.weight");
+  config.mlp_hidden = shape_of(vit, "blocks.0.mlp.fc1.bias", 1, source)[0];
+  const WeightScope camera = store.root().at("camera_head");
+  config.camera_depth = camera.count("trunk", "norm1.weight");
+  config.camera_hidden = shape_of(camera, "trunk.0.mlp.fc1.bias", 1, source)[0];
+  const WeightScope dense = store.root().at(
+      store.root().contains("depth_head.norm.weight") ? "depth_head" : "point_head");
+  if (dense.contains("norm.weight")) read_dense_shapes(dense, source, config);
 }
 
 void read_metadata(const std::string& text, const std::string& source, VggtConfig& config) {

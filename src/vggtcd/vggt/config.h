@@ -19,7 +19,14 @@ struct VggtConfig {
   int64_t register_tokens = 0;  // of the aggregator, beside one camera token
   int64_t vit_register_tokens = 0;
   int vit_depth = 0;
-  int depth = 0;  // frame blocks, and as many global blocks
+  int depth = 0;           // frame blocks, and as many global blocks
+  int64_t mlp_hidden = 0;  // of the MLPs of ViT and aggregator
+  int camera_depth = 0;    // blocks of the camera head's trunk
+  int64_t camera_hidden = 0;
+  // Of the depth head, 0 without one; the point head's are the same.
+  int64_t dpt_features = 0;
+  std::array<int64_t, 4> dpt_channels{};
+  std::array<int64_t, 2> dpt_output_channels{};  // of output_conv1 and output_conv2.0
   // From metadata or VGGT-1B.
   int64_t heads = 16;
   int64_t vit_heads = 16;

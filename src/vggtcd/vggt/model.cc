@@ -143,33 +143,40 @@ void Vggt::check_images(const ImageBatch& images) const {
         "images: one name per frame");
 }
 
+VggtRun Vggt::run_of(const ImageBatch& images) const {
+  return {
+      images.frames,           images.height,          images.width, precision_ == Precision::kBf16,
+      depth_head_.has_value(), point_head_.has_value()};
+}
+
 void Vggt::run_dense_heads(const ImageBatch& images, const AggregatedTokens& tokens,
                            Prediction& prediction, ProgressSink& progress,
                            const Trace& trace) const {
   DptWorkspace workspace;
   const size_t pixels = prediction.reconstruction.pixels_per_frame();
   std::vector<float> raw;
-  const auto run = [&](const DptHead& head, const char* stage_name, auto&& split) {
-    ProgressStage stage(progress, stage_name);
+  const auto run = [&](const DptHead& head, VggtStage which, auto&& split) {
+    ProgressStage stage(progress, std::string(stage_name(which)));
     raw.resize(pixels * static_cast<size_t>(head.outputs()));
     for (int64_t frame = 0; frame < images.frames; ++frame) {
       head.forward(tokens, frame, images.height, images.width, raw.data(), workspace, trace);
       split(static_cast<size_t>(frame) * pixels);
       stage.advance(static_cast<double>(frame + 1) / static_cast<double>(images.frames));
     }
+    prediction.seconds[static_cast<size_t>(which)] = stage.seconds();
   };
   Reconstruction& r = prediction.reconstruction;
   r.depth.resize(r.num_pixels());
   r.confidence.resize(r.num_pixels());
   if (depth_head_) {
-    run(*depth_head_, "depth", [&](size_t first) {
+    run(*depth_head_, VggtStage::kDepth, [&](size_t first) {
       split_depth(raw, r.depth.data() + first, r.confidence.data() + first);
     });
   }
   if (point_head_) {
     prediction.world_points.resize(3 * r.num_pixels());
     prediction.world_points_conf.resize(r.num_pixels());
-    run(*point_head_, "points", [&](size_t first) {
+    run(*point_head_, VggtStage::kPoints, [&](size_t first) {
       split_points(raw, prediction.world_points.data() + 3 * first,
                    prediction.world_points_conf.data() + first);
     });
@@ -183,15 +190,25 @@ Prediction Vggt::reconstruct(const ImageBatch& images, ProgressSink& progress,
   // aggregated_tokens_list, patch_start_idx = self.aggregator(images)
   const AggregatedTokens tokens = [&] {
     ProgressStage stage(progress, "network");
-    const int blocks = config_.vit_depth + 2 * config_.depth;
-    int done = 0;
-    return aggregator_.forward(images, trace,
-                               [&](const char*) { stage.advance(double(++done) / blocks); });
+    const VggtCost cost = cost_of(config_, run_of(images));
+    const double all = cost.flop_of(VggtStage::kPatchEmbed) +
+                       cost.flop_of(VggtStage::kFrameAttention) +
+                       cost.flop_of(VggtStage::kGlobalAttention);
+    double done = 0, last_s = 0;
+    return aggregator_.forward(images, trace, [&](VggtStage which) {
+      const double now_s = stage.seconds();
+      prediction.seconds[static_cast<size_t>(which)] += now_s - last_s;
+      last_s = now_s;
+      const int blocks = which == VggtStage::kPatchEmbed ? config_.vit_depth : config_.depth;
+      done += cost.flop_of(which) / blocks;
+      stage.advance(std::min(1.0, done / all));
+    });
   }();
   {
     // pose_enc = self.camera_head(aggregated_tokens_list)[-1]
-    const ProgressStage stage(progress, "cameras");
+    const ProgressStage stage(progress, std::string(stage_name(VggtStage::kCameras)));
     prediction.pose_enc = camera_head_.forward(tokens, trace);
+    prediction.seconds[static_cast<size_t>(VggtStage::kCameras)] = stage.seconds();
   }
   set_views(images, prediction);
   // depth, depth_conf = self.depth_head(...); pts3d, pts3d_conf = self.point_head(...)

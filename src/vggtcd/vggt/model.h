@@ -15,6 +15,7 @@
 #include "vggtcd/core/progress.h"
 #include "vggtcd/scene/reconstruction.h"
 #include "vggtcd/vggt/camera_head.h"
+#include "vggtcd/vggt/cost.h"
 #include "vggtcd/vggt/dpt_head.h"
 
 namespace vggtcd {
@@ -44,6 +45,7 @@ struct Prediction {
   std::vector<PoseEncoding> pose_enc;    // [S]
   std::vector<float> world_points;       // [S, H, W, 3] in the world frame, empty unless asked for
   std::vector<float> world_points_conf;  // [S, H, W], likewise
+  std::array<double, kNumVggtStages> seconds{};  // spent in each stage, indexed by VggtStage
 };
 
 class Vggt {
@@ -70,6 +72,7 @@ class Vggt {
  private:
   Vggt(const WeightStore& store, const std::string& config_json, const VggtOptions& options);
   void check_images(const ImageBatch& images) const;
+  VggtRun run_of(const ImageBatch& images) const;
   void run_dense_heads(const ImageBatch& images, const AggregatedTokens& tokens,
                        Prediction& prediction, ProgressSink& progress, const Trace& trace) const;
 

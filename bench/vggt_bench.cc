@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole network, VGGT-1B with weights of the recipe: time against the time that oneDNN's best
+// rate on the network's own products, measured in the same run, would need for its operations.
+//
+//   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16] [--points]
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <fstream>
+
+#include "bench/gemm_rate.h"
+#include "tests/support/weight_recipe.h"
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/core/timer.h"
+#include "vggtcd/vggt/model.h"
+
+namespace {
+
+using namespace vggtcd;
+
+// Starts the peak of resident memory afresh (Linux: clear_refs 5).
+void reset_peak_memory() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+double gigabytes(int64_t bytes) { return static_cast<double>(bytes) * 1e-9; }
+
+// Smooth pictures that differ from frame to frame: values do not change the amount of work.
+ImageBatch make_images(int64_t frames, int64_t height, int64_t width) {
+  ImageBatch images{frames, height, width, {}, {}};
+  images.pixels.resize(static_cast<size_t>(frames * 3 * height * width));
+  for (size_t i = 0; i < images.pixels.size(); ++i) {
+    images.pixels[i] = 0.5f + 0.4f * std::sin(static_cast<float>(i % 100003) * 0.013f);
+  }
+  return images;
+}
+
+Vggt load(const VggtOptions& options) {
+  const testing::RecipeWeights weights(testing::NetworkSizes::vggt_1b(), 7);
+  const Timer timer;
+  Vggt model = Vggt::from_tensors(weights.tensors(), weights.config_json(), "recipe", options);
+  fmt::print("packing the weights: {:.2f} s\n", timer.seconds());
+  return model;
+}
+
+void print_stages(const Prediction& prediction, const VggtCost& cost, double total_s) {
+  fmt::print("{:18s} {:>10s} {:>8s} {:>9s} {:>7s}\n", "stage", "GFLOP", "s", "GFLOP/s", "share");
+  for (size_t i = 0; i < kNumVggtStages; ++i) {
+    if (cost.flop[i] == 0) continue;
+    const double s = prediction.seconds[i];
+    fmt::print("{:18s} {:10.0f} {:8.2f} {:9.0f} {:6.1f}%\n", stage_name(VggtStage(i)),
+               cost.flop[i] * 1e-9, s, cost.flop[i] * 1e-9 / s, 100 * s / total_s);
+  }
+}
+
+void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool points,
+         double gemm_gflops) {
+  const ImageBatch images = make_images(frames, height, width);
+  const VggtRun shape{frames, height, width, model.precision() == Precision::kBf16, true, points};
+  reset_peak_memory();
+  const Timer timer;
+  const Prediction prediction = model.reconstruct(images);
+  const double total_s = timer.seconds();
+  const int64_t peak = peak_memory_bytes();
+  const VggtCost cost = cost_of(model.config(), shape);
+  const VggtMemory planned = memory_of(model.config(), shape);
+  fmt::print("\n{} views of {}x{}: {:.1f} TFLOP, attention {:.0f} %\n", frames, width, height,
+             cost.total_flop() * 1e-12, 100 * cost.attention_flop / cost.total_flop());
+  print_stages(prediction, cost, total_s);
+  fmt::print("time {:.2f} s = {:.2f} x the time at {:.0f} GFLOP/s\n", total_s,
+             total_s / (cost.total_flop() * 1e-9 / gemm_gflops), gemm_gflops);
+  fmt::print("peak memory {:.2f} GB; planned {:.2f} + {:.2f} GB\n", gigabytes(peak),
+             gigabytes(planned.weights), gigabytes(planned.activations));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("VGGT-1B on synthetic photos against the rate of oneDNN's matrix product");
+  std::vector<int64_t> views{10};
+  std::string size = "518x392", precision = "bf16";
+  bool points = false;
+  app.add_option("--views", views, "numbers of photos, one pass each")->delimiter(',');
+  app.add_option("--size", size, "WIDTHxHEIGHT of a photo, multiples of 14");
+  app.add_option("--precision", precision)->check(CLI::IsMember({"f32", "bf16"}));
+  app.add_flag("--points", points, "the point head too");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    const bool bf16 = precision == "bf16";
+    const size_t cross = size.find('x');
+    const int64_t width = std::stoll(size), height = std::stoll(size.substr(cross + 1));
+    const auto rates = bench::measure_gemm_rates(bf16);
+    for (const auto& rate : rates) {
+      fmt::print("oneDNN {} [{}, {}] x [{}, {}]: {:.0f} GFLOP/s\n", precision, rate.rows, rate.in,
+                 rate.in, rate.out, rate.gflops);
+    }
+    const Vggt model =
+        load({.precision = bf16 ? Precision::kBf16 : Precision::kF32, .point_head = points});
+    fmt::print("{}, {} threads\n", precision, num_threads());
+    for (const int64_t frames : views) {
+      run(model, frames, height, width, points, bench::best_gflops(rates));
+    }
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "vggt_bench: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
