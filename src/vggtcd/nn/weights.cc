@@ -2,6 +2,8 @@
 // WeightStore: tensors by name, all or nothing.
 #include "vggtcd/nn/weights.h"
 
+#include <sys/mman.h>
+
 #include "vggtcd/core/error.h"
 
 namespace vggtcd {
@@ -13,6 +15,14 @@ bool is_floating(DType dtype) {
 }
 
 }  // namespace
+
+void release_pages(std::span<const std::byte> bytes) {
+  constexpr uintptr_t kPage = 4096;
+  const auto begin = reinterpret_cast<uintptr_t>(bytes.data());
+  const uintptr_t first = (begin + kPage - 1) / kPage * kPage;
+  const uintptr_t last = (begin + bytes.size()) / kPage * kPage;
+  if (first < last) madvise(reinterpret_cast<void*>(first), last - first, MADV_DONTNEED);
+}
 
 WeightStore::WeightStore(std::vector<TensorView> tensors, std::string source,
                          ReleaseWeights release)

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -23,6 +24,10 @@ class WeightScope;
 // Called with the bytes of a tensor when its values have been copied to where they are used: the
 // owner may give the memory back to the system.
 using ReleaseWeights = std::function<void(std::span<const std::byte>)>;
+
+// Gives the whole pages inside these bytes back to the system: a file mapped read-only would read
+// them again, anonymous memory becomes zeros. For tensors that share no memory.
+void release_pages(std::span<const std::byte> bytes);
 
 class WeightStore {
  public:
