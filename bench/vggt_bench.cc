@@ -2,7 +2,8 @@
 // The whole network, VGGT-1B with weights of the recipe: time against the time that oneDNN's best
 // rate on the network's own products, measured in the same run, would need for its operations.
 //
-//   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16] [--points]
+//   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16] [--weights FILE]
+//   [--points]
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -34,7 +35,16 @@ ImageBatch make_images(int64_t frames, int64_t height, int64_t width) {
   return images;
 }
 
-Vggt load(const VggtOptions& options) {
+// Without a file: weights of the recipe.
+Vggt load(const std::string& path, const VggtOptions& options) {
+  if (!path.empty()) {
+    reset_peak_memory();
+    const Timer timer;
+    Vggt model = Vggt::load(path, options);
+    fmt::print("loading {}: {:.2f} s, peak memory {:.2f} GB\n", path, timer.seconds(),
+               gigabytes(peak_memory_bytes()));
+    return model;
+  }
   const testing::RecipeWeights weights(testing::NetworkSizes::vggt_1b(), 7);
   const Timer timer;
   Vggt model = Vggt::from_tensors(weights.tensors(), weights.config_json(), "recipe", options);
@@ -77,11 +87,12 @@ void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool 
 int main(int argc, char** argv) {
   CLI::App app("VGGT-1B on synthetic photos against the rate of oneDNN's matrix product");
   std::vector<int64_t> views{10};
-  std::string size = "518x392", precision = "bf16";
+  std::string size = "518x392", precision = "bf16", weights;
   bool points = false;
   app.add_option("--views", views, "numbers of photos, one pass each")->delimiter(',');
   app.add_option("--size", size, "WIDTHxHEIGHT of a photo, multiples of 14");
   app.add_option("--precision", precision)->check(CLI::IsMember({"f32", "bf16"}));
+  app.add_option("--weights", weights, "a weights file instead of the recipe; its load is timed");
   app.add_flag("--points", points, "the point head too");
   CLI11_PARSE(app, argc, argv);
   try {
@@ -93,8 +104,8 @@ int main(int argc, char** argv) {
       fmt::print("oneDNN {} [{}, {}] x [{}, {}]: {:.0f} GFLOP/s\n", precision, rate.rows, rate.in,
                  rate.in, rate.out, rate.gflops);
     }
-    const Vggt model =
-        load({.precision = bf16 ? Precision::kBf16 : Precision::kF32, .point_head = points});
+    const Vggt model = load(
+        weights, {.precision = bf16 ? Precision::kBf16 : Precision::kF32, .point_head = points});
     fmt::print("{}, {} threads\n", precision, num_threads());
     for (const int64_t frames : views) {
       run(model, frames, height, width, points, bench::best_gflops(rates));

@@ -7,6 +7,7 @@
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/pose_encoding.h"
+#include "vggtcd/io/weight_file.h"
 
 namespace vggtcd {
 namespace {
@@ -119,6 +120,16 @@ Vggt::Vggt(const WeightStore& store, const std::string& config_json, const VggtO
     ignored.push_back("point_head.");
   }
   superfluous_ = store.untaken(ignored);
+}
+
+Vggt Vggt::load(const std::filesystem::path& path, const VggtOptions& options) {
+  WeightFile file = open_weight_file(path);
+  const auto config = file.metadata.find("config");
+  // Tensors of a torch checkpoint may share memory or be copies, so only those of safetensors are
+  // let go one by one: the file's pages and their packed copies are never all resident together.
+  const bool disjoint = file.format == WeightFormat::kSafetensors;
+  return from_tensors(std::move(file.tensors), config == file.metadata.end() ? "" : config->second,
+                      path.string(), options, disjoint ? release_pages : ReleaseWeights());
 }
 
 Vggt Vggt::from_tensors(std::vector<TensorView> tensors, const std::string& config_json,

@@ -2,10 +2,11 @@
 // Vggt: the network: photos of one place -> cameras, depth and confidence in one frame; upstream
 // vggt.models.vggt.VGGT.
 //
-//   const Vggt model = Vggt::from_tensors(tensors, config_json, "model.safetensors", {});
+//   const Vggt model = Vggt::load("model.safetensors", {});
 //   const Prediction prediction = model.reconstruct(images);
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <span>
 #include <string>
@@ -50,6 +51,10 @@ struct Prediction {
 
 class Vggt {
  public:
+  // Reads a weights file: the official model.safetensors or model.pt, or a converted one; the file
+  // is mapped and not needed afterwards. Throws what open_weight_file and from_tensors throw.
+  static Vggt load(const std::filesystem::path& path, const VggtOptions& options);
+
   // Builds the network; all weights are copied, so the tensors may go away afterwards. source names
   // their file in errors; config_json: see read_config; release: see WeightStore. Throws
   // Error{kWeights} if a tensor that the options need is missing or misshapen, Error{kUsage} for
