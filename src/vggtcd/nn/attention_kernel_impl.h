@@ -17,7 +17,8 @@ struct F32Words : Simd {
   using V = typename Simd::V;
   static constexpr int kPerWord = 1;
   static V dot(V acc, V a, V b) { return Simd::fma(a, b, acc); }
-  static V exp2(V x) { return exp2_f32<Simd>(x); }
+  // The bound keeps minus infinity, a score that overflowed, from becoming NaN.
+  static V exp2(V x) { return exp2_f32<Simd>(Simd::max(Simd::set(-1000.0f), x)); }
 };
 
 // S: vector type with dot(), exp2() and kPerWord; T: element type of q and out.

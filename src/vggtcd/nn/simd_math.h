@@ -21,18 +21,6 @@ inline typename S::V exp2_f32(typename S::V x) {
   return S::scale_by_power_of_2(p, n);
 }
 
-// The same with relative error 8e-5: a fiftieth of the rounding to bfloat16 that follows it.
-template <typename S>
-inline typename S::V exp2_for_bf16(typename S::V x) {
-  const auto n = S::round(x);
-  const auto f = S::sub(x, n);
-  auto p = S::set(5.517167e-02f);
-  p = S::fma(p, f, S::set(2.4261113e-01f));
-  p = S::fma(p, f, S::set(6.9326097e-01f));
-  p = S::fma(p, f, S::set(9.9992806e-01f));
-  return S::scale_by_power_of_2(p, n);
-}
-
 // x * Phi(x). With a = |x| and t = 1 / (1 + 0.3 a), the tail Phi(-a) is exp(-a^2 / 2) times a
 // polynomial in t, relative error 1.2e-7 up to a = 13, where the exponential underflows.
 template <typename S>
