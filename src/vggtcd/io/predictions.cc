@@ -5,8 +5,6 @@
 
 #include <fmt/ranges.h>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,6 +14,7 @@
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/npz.h"
+#include "vggtcd/io/pose_matrix.h"
 #include "vggtcd/io/prediction_layout.h"
 
 namespace vggtcd {
@@ -92,35 +91,6 @@ void expect_map(const NpzReader& npz, const std::string& key, const PredictionLa
   npz.expect_shape(key, shape);
 }
 
-// Poses are stored in 16 or 32 bits: a rotation is accepted within 1e-2 (half precision has
-// 5e-4 per entry) and replaced by the nearest exact one, as Rigid3 relies on R^-1 = R^T.
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix, const std::string& where) {
-  const double error =
-      (matrix.transpose() * matrix - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= 1e-2) || matrix.determinant() < 0) {
-    throw_error(ErrorCode::kInput,
-                "{}: expected a rotation, found |R^T R - I| = {:.2g} and determinant {:.2g}", where,
-                error, matrix.determinant());
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * svd.matrixV().transpose();
-}
-
-Rigid3 read_pose(const double* values, bool has_last_row, bool world_from_camera,
-                 const std::string& where) {
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> top(values);
-  if (!top.allFinite()) throw_error(ErrorCode::kInput, "{}: expected finite numbers", where);
-  if (has_last_row) {
-    const Eigen::Map<const Eigen::RowVector4d> last(values + 12);
-    if (!last.isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-3)) {
-      throw_error(ErrorCode::kInput, "{}: expected the last row 0 0 0 1, found {} {} {} {}", where,
-                  last[0], last[1], last[2], last[3]);
-    }
-  }
-  const Rigid3 pose{nearest_rotation(top.leftCols<3>(), where), top.col(3)};
-  return world_from_camera ? pose.inverse() : pose;
-}
-
 Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std::string& where) {
   const bool finite = std::all_of(k, k + 9, [](double value) { return std::isfinite(value); });
   const bool form = std::abs(k[1]) <= 1e-3 * std::abs(k[0]) && k[3] == 0 && k[6] == 0 &&
@@ -165,8 +135,9 @@ std::vector<View> read_views(const NpzReader& npz, const PredictionLayout& layou
     const auto where = [&](const std::string& key) {
       return fmt::format("{}: {}: frame {}", npz.name(), key, i);
     };
-    views[i].camera_from_world = read_pose(poses.data() + i * stride, stride == 16,
-                                           layout.world_from_camera, where(layout.poses));
+    const Rigid3 pose = internal::pose_from_matrix(std::span(poses).subspan(i * stride, stride),
+                                                   where(layout.poses));
+    views[i].camera_from_world = layout.world_from_camera ? pose.inverse() : pose;
     views[i].pinhole = read_pinhole(intrinsics.data() + i * 9, layout, where(layout.intrinsics));
     views[i].name = names[i];
   }

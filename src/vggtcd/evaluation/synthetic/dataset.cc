@@ -7,7 +7,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/synthetic/truth_file.h"
 #include "vggtcd/geometry/umeyama.h"
-#include "vggtcd/io/jpeg.h"
+#include "vggtcd/io/image_write.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"

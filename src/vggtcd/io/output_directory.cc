@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// OutputDirectory: checks first, one rename last.
+#include "vggtcd/io/output_directory.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <system_error>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/io/output_file.h"
+
+namespace vggtcd {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const fs::path& target, std::string_view reason) {
+  throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", target.string(), reason);
+}
+
+// The target without symbolic links, "." and final slashes, so that renaming means it.
+fs::path resolve(const fs::path& target) {
+  std::error_code error;
+  if (target.empty()) fail(target, "no directory given");
+  fs::path resolved = fs::weakly_canonical(fs::absolute(target), error);
+  if (error) fail(target, error.message());
+  if (!resolved.has_filename()) resolved = resolved.parent_path();
+  if (resolved == resolved.root_path() || resolved == fs::current_path(error)) {
+    fail(target, "results need a directory of their own; name one that is not here yet");
+  }
+  return resolved;
+}
+
+void check_replaceable(const fs::path& target) {
+  std::error_code error;
+  const fs::file_status status = fs::status(target, error);
+  if (!fs::exists(status)) return;
+  if (!fs::is_directory(status)) fail(target, "is a file");
+  const bool empty = fs::is_empty(target, error);
+  if (error) fail(target, error.message());
+  if (!empty && !fs::exists(target / OutputDirectory::kMarker)) {
+    fail(target, "is a directory that holds other files; name another one, or empty it");
+  }
+}
+
+}  // namespace
+
+OutputDirectory::OutputDirectory(const fs::path& target) : target_(resolve(target)) {
+  check_replaceable(target_);
+  aside_ = target_;
+  aside_ += fmt::format(".partial-{}", getpid());
+  for (fs::path parent = target_.parent_path(); !fs::exists(parent);
+       parent = parent.parent_path()) {
+    first_created_parent_ = parent;
+  }
+  std::error_code error;
+  fs::remove_all(aside_, error);  // of a killed process that had our number
+  fs::create_directories(aside_, error);
+  try {
+    if (error) fail(target_, error.message());
+    write_text_file(aside_ / kMarker, "Written by vggt-cd, which may replace this directory.\n");
+  } catch (...) {
+    // A constructor that throws has no destructor.
+    fs::remove_all(first_created_parent_.empty() ? aside_ : first_created_parent_, error);
+    throw;
+  }
+}
+
+OutputDirectory::~OutputDirectory() {
+  if (committed_) return;
+  std::error_code ignored;
+  fs::remove_all(aside_, ignored);
+  // Parents that were made for this, as long as nobody else uses them: rmdir takes empty ones only.
+  if (first_created_parent_.empty()) return;
+  for (fs::path parent = target_.parent_path(); rmdir(parent.c_str()) == 0;
+       parent = parent.parent_path()) {
+    if (parent == first_created_parent_) break;
+  }
+}
+
+fs::path OutputDirectory::subdirectory(std::string_view name) const {
+  const fs::path path = aside_ / name;
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error) fail(target_, error.message());
+  return path;
+}
+
+void OutputDirectory::commit() {
+  check(!committed_, "OutputDirectory: committed twice");
+  check_replaceable(target_);  // somebody may have put something there meanwhile
+  std::error_code error;
+  if (!fs::exists(target_)) {
+    fs::rename(aside_, target_, error);
+    if (error) fail(target_, error.message());
+    committed_ = true;
+    return;
+  }
+  // Old and new change places in one step, so that there are complete results at any time.
+  if (renameat2(AT_FDCWD, aside_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0) {
+    if (errno != EINVAL && errno != ENOSYS) fail(target_, std::strerror(errno));
+    // A file system that cannot exchange: in two steps.
+    fs::path old = aside_;
+    old += ".old";
+    fs::rename(target_, old, error);
+    if (!error) fs::rename(aside_, target_, error);
+    if (error) {
+      const std::string reason = error.message();
+      fs::rename(old, target_, error);
+      fail(target_, reason);
+    }
+    fs::rename(old, aside_, error);
+  }
+  committed_ = true;
+  fs::remove_all(aside_, error);  // the old results
+}
+
+}  // namespace vggtcd

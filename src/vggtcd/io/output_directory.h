@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// OutputDirectory: a directory of results that appears complete or not at all.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace vggtcd {
+
+// Files are written into a directory beside the target, "OUT.partial-PID", and commit() puts it in
+// the target's place. A target that is there already must be empty or an earlier directory of
+// results, which is then replaced as a whole; results are recognised by the file kMarker. Every
+// failure throws Error{kOutput} in one line, and leaves the target as it was and nothing beside it.
+class OutputDirectory {
+ public:
+  static constexpr std::string_view kMarker = ".vggt-cd-results";
+
+  // Fails now, before any work is done, if the results could not be written later.
+  explicit OutputDirectory(const std::filesystem::path& target);
+  ~OutputDirectory();  // without commit(): removes what was written
+  OutputDirectory(const OutputDirectory&) = delete;
+  OutputDirectory& operator=(const OutputDirectory&) = delete;
+
+  // Where to write for now.
+  const std::filesystem::path& path() const { return aside_; }
+  std::filesystem::path operator/(std::string_view name) const { return aside_ / name; }
+  // path() / name, created.
+  std::filesystem::path subdirectory(std::string_view name) const;
+
+  void commit();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path aside_;
+  std::filesystem::path first_created_parent_;  // empty if all parents were there
+  bool committed_ = false;
+};
+
+}  // namespace vggtcd

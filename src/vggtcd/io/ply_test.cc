@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vggtcd/io/ply.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "tests/support/test_files.h"
+
+namespace vggtcd {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+const char* const kMixed = "tests/golden/geometry_files/mixed.ply";
+
+void write_three_points(const std::filesystem::path& path) {
+  PlyWriter ply(path, 3, {"change_distance", "changed"}, std::vector<std::string>{"frame T2"});
+  for (int i = 0; i < 3; ++i) {
+    const float x = static_cast<float>(i);
+    const uint8_t rgb[] = {static_cast<uint8_t>(i), 200, 255};
+    const float values[] = {i == 2 ? NAN : x / 2, 1.0f};
+    ply.add({x, -x, 0.1f}, rgb, values);
+  }
+  ply.commit();
+}
+
+TEST(PlyWriter, WritesTheHeaderAndRecordsThatViewersExpect) {
+  const TemporaryDirectory directory;
+  write_three_points(directory / "a.ply");
+  const std::string bytes = file_bytes(directory / "a.ply");
+  const std::string header =
+      "ply\nformat binary_little_endian 1.0\ncomment frame T2\nelement vertex 3\n"
+      "property float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+      "property float scalar_change_distance\nproperty float scalar_changed\n"
+      "property float quality\nend_header\n";
+  ASSERT_EQ(bytes.substr(0, header.size()), header);
+  ASSERT_EQ(bytes.size(), header.size() + 3 * (12 + 3 + 12));
+  const char* second = bytes.data() + header.size() + 27;
+  const auto number = [&](size_t offset) {
+    float value;
+    std::memcpy(&value, second + offset, sizeof(value));
+    return value;
+  };
+  EXPECT_EQ(number(0), 1.0f);
+  EXPECT_EQ(number(4), -1.0f);
+  EXPECT_EQ(number(8), 0.1f);
+  EXPECT_EQ(std::string(second + 12, 3), "\x01\xc8\xff");
+  EXPECT_EQ(number(15), 0.5f);
+  EXPECT_EQ(number(19), 1.0f);
+  EXPECT_EQ(number(23), 0.5f);
+}
+
+TEST(ReadPly, ReadsBackWhatWasWritten) {
+  const TemporaryDirectory directory;
+  write_three_points(directory / "a.ply");
+  const PlyCloud cloud = read_ply(directory / "a.ply");
+  ASSERT_EQ(cloud.positions.size(), 3u);
+  EXPECT_EQ(cloud.positions[2], Eigen::Vector3f(2, -2, 0.1f));
+  EXPECT_THAT(cloud.rgb, ElementsAre(0, 200, 255, 1, 200, 255, 2, 200, 255));
+  ASSERT_NE(cloud.field("change_distance"), nullptr);
+  EXPECT_EQ((*cloud.field("change_distance"))[1], 0.5f);
+  EXPECT_TRUE(std::isnan((*cloud.field("change_distance"))[2]));
+  EXPECT_EQ((*cloud.field("changed"))[0], 1.0f);
+  EXPECT_EQ(cloud.field("confidence"), nullptr);
+}
+
+TEST(ReadPly, ReadsEveryTypeAndIgnoresFaces) {
+  const PlyCloud cloud = read_ply(source_file(kMixed));
+  ASSERT_EQ(cloud.positions.size(), 3u);
+  EXPECT_EQ(cloud.positions[2], Eigen::Vector3f(2, -1, 4));
+  EXPECT_THAT(cloud.rgb, ElementsAre(0, 0, 255, 1, 10, 254, 2, 20, 253));
+  EXPECT_THAT(*cloud.field("score"), ElementsAre(0, 0.25f, 0.5f));
+  EXPECT_THAT(*cloud.field("label"), ElementsAre(0, -1000, -2000));
+  EXPECT_THAT(*cloud.field("level"), ElementsAre(60000, 60001, 60002));
+  EXPECT_THAT(*cloud.field("sign"), ElementsAre(0, -1, -2));
+}
+
+TEST(ReadPly, EmptyCloudsAreClouds) {
+  const TemporaryDirectory directory;
+  PlyWriter(directory / "a.ply", 0, {"changed"}).commit();
+  EXPECT_EQ(read_ply(directory / "a.ply").positions.size(), 0u);
+}
+
+TEST(ReadPly, RefusesOtherAndDamagedFiles) {
+  const TemporaryDirectory directory;
+  const auto expect = [&](std::string_view content, std::string_view part) {
+    write_bytes(directory / "a.ply", content);
+    EXPECT_INPUT_ERROR(read_ply(directory / "a.ply"), part);
+  };
+  const std::string start = "ply\nformat binary_little_endian 1.0\n";
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
+  expect("", "found a truncated header");
+  expect("obj\n", "found another file");
+  expect("ply\nformat ascii 1.0\nend_header\n", "found ascii data");
+  expect(start + "element vertex 2\n", "found a truncated header");
+  expect(start + "end_header\n", "found no vertices with x, y and z");
+  expect(start + "element vertex 2\nproperty float x\nend_header\n", "found no vertices");
+  expect(start + "element vertex two\n" + xyz, "found a broken header line: element vertex two");
+  expect(start + "element vertex 2\nproperty float x\n" + xyz, "found an unusable property");
+  expect(start + "element vertex 2\nproperty list uchar int x\n" + xyz, "an unusable property");
+  expect(start + "element face 2\nelement vertex 2\n" + xyz, "an element face before the vertices");
+  expect(start + "element vertex 2\n" + xyz + std::string(23, 'a'),
+         "expected 2 points of 12 bytes, found 23 bytes; truncated");
+  expect(start + "element vertex 9000000000000000000\n" + xyz, "truncated");
+  EXPECT_INPUT_ERROR(read_ply(directory / "none.ply"), "found no readable file");
+}
+
+TEST(PlyWriter, WithoutCommitLeavesNothing) {
+  const TemporaryDirectory directory;
+  { PlyWriter ply(directory / "a.ply", 3, {}); }
+  EXPECT_EQ(directory.num_files(), 0u);
+  EXPECT_ERROR(PlyWriter(directory / "no/a.ply", 0, {}), ErrorCode::kOutput,
+               "no/a.ply: cannot be written: No such file or directory");
+}
+
+}  // namespace
+}  // namespace vggtcd

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// TUM trajectories.
+#include "vggtcd/io/tum.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <fstream>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/io/output_file.h"
+#include "vggtcd/io/text_line.h"
+
+namespace vggtcd {
+
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
+  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    const Rigid3 world_from_camera = trajectory[i].camera_from_world.inverse();
+    const Eigen::Vector3d& t = world_from_camera.translation;
+    Eigen::Quaterniond q(world_from_camera.rotation);
+    if (q.w() < 0) q.coeffs() *= -1;  // of the two equal ones always the same
+    text += fmt::format("{} {} {} {} {} {} {} {}\n", i, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(),
+                        q.w());
+  }
+  write_text_file(path, text);
+}
+
+Trajectory read_tum(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path)) {
+    throw_error(ErrorCode::kInput, "{}: expected a trajectory file, found no readable file",
+                path.string());
+  }
+  Trajectory trajectory;
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    const TextLine words(path, number, line);
+    if (words.is_blank_or_comment()) continue;
+    words.expect_count(8, "timestamp tx ty tz qx qy qz qw");
+    words.number(0);
+    const Eigen::Quaterniond q = words.unit_quaternion({4, 5, 6, 7});
+    const Eigen::Vector3d t(words.number(1), words.number(2), words.number(3));
+    trajectory.push_back({std::string(words.word(0)), Rigid3{q.toRotationMatrix(), t}.inverse()});
+  }
+  if (trajectory.empty()) {
+    throw_error(ErrorCode::kInput, "{}: expected camera poses, found none", path.string());
+  }
+  return trajectory;
+}
+
+}  // namespace vggtcd
