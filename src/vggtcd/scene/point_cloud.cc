@@ -8,33 +8,19 @@
 #include "vggtcd/core/parallel.h"
 
 namespace vggtcd {
-namespace {
 
-// x_out = matrix * depth * (u, v, 1) + offset: camera, world and out_from_world in one affine map.
-struct PixelRays {
-  Eigen::Matrix3d matrix;
-  Eigen::Vector3d offset;
-
-  PixelRays(const View& view, const Sim3& out_from_world) {
-    const Rigid3 world_from_camera = view.camera_from_world.inverse();
-    Eigen::Matrix3d camera_from_pixel = Eigen::Matrix3d::Zero();
-    camera_from_pixel(0, 0) = 1.0 / view.pinhole.fx;
-    camera_from_pixel(0, 2) = -view.pinhole.cx / view.pinhole.fx;
-    camera_from_pixel(1, 1) = 1.0 / view.pinhole.fy;
-    camera_from_pixel(1, 2) = -view.pinhole.cy / view.pinhole.fy;
-    camera_from_pixel(2, 2) = 1.0;
-    matrix = out_from_world.scale * out_from_world.rotation * world_from_camera.rotation *
-             camera_from_pixel;
-    offset = out_from_world * world_from_camera.translation;
-  }
-
-  Eigen::Vector3f point(int u_px, int v_px, float depth) const {
-    return (matrix * (static_cast<double>(depth) * Eigen::Vector3d(u_px, v_px, 1.0)) + offset)
-        .cast<float>();
-  }
-};
-
-}  // namespace
+PixelRays::PixelRays(const View& view, const Sim3& out_from_world) {
+  const Rigid3 world_from_camera = view.camera_from_world.inverse();
+  Eigen::Matrix3d camera_from_pixel = Eigen::Matrix3d::Zero();
+  camera_from_pixel(0, 0) = 1.0 / view.pinhole.fx;
+  camera_from_pixel(0, 2) = -view.pinhole.cx / view.pinhole.fx;
+  camera_from_pixel(1, 1) = 1.0 / view.pinhole.fy;
+  camera_from_pixel(1, 2) = -view.pinhole.cy / view.pinhole.fy;
+  camera_from_pixel(2, 2) = 1.0;
+  matrix = out_from_world.scale * out_from_world.rotation * world_from_camera.rotation *
+           camera_from_pixel;
+  offset = out_from_world * world_from_camera.translation;
+}
 
 Eigen::Vector3f unproject_pixel(const Reconstruction& reconstruction, uint32_t pixel,
                                 const Sim3& out_from_world) {

@@ -20,6 +20,20 @@ struct PointCloud {
   size_t size() const { return positions.size(); }
 };
 
+// Eq. 1 of the paper for one view: x_out = matrix * depth * (u, v, 1) + offset; camera, world and
+// out_from_world in one affine map in double precision.
+struct PixelRays {
+  Eigen::Matrix3d matrix;
+  Eigen::Vector3d offset;
+
+  PixelRays(const View& view, const Sim3& out_from_world);
+
+  Eigen::Vector3f point(int u_px, int v_px, float depth) const {
+    return (matrix * (static_cast<double>(depth) * Eigen::Vector3d(u_px, v_px, 1.0)) + offset)
+        .cast<float>();
+  }
+};
+
 // Eq. 1 of the paper: the point of a pixel, R^-1 (D K^-1 u - t), pixel centres at integers;
 // out_from_world is applied to it in double precision before rounding.
 Eigen::Vector3f unproject_pixel(const Reconstruction& reconstruction, uint32_t pixel,

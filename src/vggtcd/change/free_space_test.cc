@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vggtcd/change/free_space.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "tests/support/toy_scene.h"
+#include "vggtcd/change/view_overlap.h"
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/scene/point_cloud.h"
+
+namespace vggtcd {
+namespace {
+
+using testing_support::reconstruct;
+using testing_support::ToyScene;
+
+double flat(double, double) { return 0.0; }
+double with_box(double x, double y) { return x > 0.2 && x < 0.8 && std::abs(y) < 0.3 ? 0.5 : 0.0; }
+
+const Sim3 kT2FromT1{
+    1.7,
+    Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 1, 1).normalized()).toRotationMatrix(),
+    {3, 2, 1}};
+
+ToyScene scene(double (*relief)(double, double), double offset) {
+  return {.frames = 5, .width = 96, .height = 72, .camera_offset = offset, .relief = relief};
+}
+
+// Where the pixel's point lies in the toy scene, for reconstructions in T2's frame.
+Eigen::Vector3d in_scene(const Reconstruction& r, size_t pixel) {
+  return kT2FromT1.inverse() * unproject_pixel(r, static_cast<uint32_t>(pixel)).cast<double>();
+}
+
+TEST(FreeSpaceChanges, ABoxThatAppearedIsAddedAndTheRestUnchanged) {
+  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
+  int box = 0, box_added = 0, plane = 0, plane_added = 0;
+  for (size_t i = 0; i < after.num_pixels(); ++i) {
+    const ChangeLabel label = change.t2.label[i];
+    if (label == ChangeLabel::kNoEvidence || label == ChangeLabel::kUnobserved) continue;
+    const double height = 5.0 - in_scene(after, i).z();
+    if (height > 0.45) {
+      ++box;
+      box_added += label == ChangeLabel::kAdded ? 1 : 0;
+    } else if (height < 0.01) {
+      ++plane;
+      plane_added += label == ChangeLabel::kAdded ? 1 : 0;
+    }
+    EXPECT_NE(label, ChangeLabel::kRemoved);
+  }
+  ASSERT_GT(box, 500);
+  EXPECT_GT(box_added, 0.97 * box);
+  EXPECT_LT(plane_added, 0.01 * plane);
+}
+
+TEST(FreeSpaceChanges, WhatTheBoxHidesIsNotCalledRemoved) {
+  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
+  int removed = 0, judged = 0;
+  for (const ChangeLabel label : change.t1.label) {
+    removed += label == ChangeLabel::kRemoved ? 1 : 0;
+    judged += label == ChangeLabel::kUnchanged ? 1 : 0;
+  }
+  EXPECT_GT(judged, 1000);
+  EXPECT_LT(removed, 0.01 * judged);  // the plane behind the box is still there
+}
+
+TEST(FreeSpaceChanges, ABoxThatVanishedIsRemoved) {
+  const Reconstruction before = reconstruct(scene(with_box, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(flat, 0.1), kT2FromT1);
+  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
+  int removed_on_box = 0, removed_elsewhere = 0;
+  for (size_t i = 0; i < before.num_pixels(); ++i) {
+    if (change.t1.label[i] != ChangeLabel::kRemoved) continue;
+    const bool on_box = 5.0 - unproject_pixel(before, static_cast<uint32_t>(i)).z() > 0.05f;
+    (on_box ? removed_on_box : removed_elsewhere) += 1;
+    EXPECT_GT(change.t1.gap[i], 0);
+  }
+  EXPECT_GT(removed_on_box, 500);
+  EXPECT_LT(removed_elsewhere, 0.03 * removed_on_box);
+}
+
+TEST(FreeSpaceChanges, WhatTheOtherEpochNeverSawIsUnobserved) {
+  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(flat, 50.0), Sim3{});  // a walk somewhere else
+  const FreeSpaceChange change = free_space_changes(before, after, Sim3{}, {});
+  for (const ChangeLabel label : change.t1.label) {
+    EXPECT_TRUE(label == ChangeLabel::kUnobserved || label == ChangeLabel::kNoEvidence);
+  }
+}
+
+TEST(FreeSpaceChanges, AnUnchangedSceneHasNoChanges) {
+  const Reconstruction before = reconstruct(scene(with_box, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
+  int changed = 0;
+  for (const auto* labels : {&change.t1.label, &change.t2.label}) {
+    for (const ChangeLabel label : *labels) {
+      changed += label == ChangeLabel::kRemoved || label == ChangeLabel::kAdded ? 1 : 0;
+    }
+  }
+  EXPECT_LT(changed, 0.005 * static_cast<double>(before.num_pixels() + after.num_pixels()));
+}
+
+TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
+  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  set_num_threads(1);
+  const FreeSpaceChange one = free_space_changes(before, after, kT2FromT1, {});
+  set_num_threads(5);
+  const FreeSpaceChange five = free_space_changes(before, after, kT2FromT1, {});
+  set_num_threads(2);
+  EXPECT_EQ(one.t2.label, five.t2.label);
+  EXPECT_EQ(one.t2.votes, five.t2.votes);
+  for (size_t i = 0; i < one.t2.gap.size(); ++i) {
+    EXPECT_TRUE(one.t2.gap[i] == five.t2.gap[i] || std::isnan(one.t2.gap[i]));
+  }
+}
+
+TEST(OverlappingViews, RanksTheViewFromTheSamePlaceFirst) {
+  const Reconstruction walk = reconstruct(scene(flat, 0), Sim3{});
+  const auto views = overlapping_views(walk, walk, Sim3{}, 2);
+  for (size_t i = 0; i < views.size(); ++i) {
+    ASSERT_EQ(views[i].size(), 2u);
+    EXPECT_EQ(views[i][0], static_cast<int>(i));
+  }
+}
+
+TEST(FreeSpaceOptions, RefuseNoViews) {
+  EXPECT_THROW(FreeSpaceOptions{.max_views = 0}.validate(), Error);
+}
+
+}  // namespace
+}  // namespace vggtcd

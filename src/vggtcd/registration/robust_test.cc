@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vggtcd/registration/robust.h"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "tests/support/toy_scene.h"
+
+namespace vggtcd {
+namespace {
+
+using testing_support::reconstruct;
+
+double bumps(double x, double y) { return 0.3 + 0.25 * std::sin(2 * x) * std::cos(3 * y); }
+double bumps_and_box(double x, double y) {
+  return x > 0.3 && x < 0.9 && std::abs(y) < 0.4 ? 0.9 : bumps(x, y);
+}
+
+// What is left between two similarities, as parameters about a point of the toy scene.
+Vector7 difference(const Sim3& a, const Sim3& b) {
+  return similarity_parameters(a * b.inverse(), {0.5, 0, 5});
+}
+
+const Sim3 kError = small_similarity(
+    (Vector7() << 0.01, -0.008, 0.012, 0.02, 0.01, -0.03, 0.008).finished(), {0.5, 0, 5});
+
+OrientedPoints points_of(double (*relief)(double, double), double camera_offset) {
+  return oriented_points(reconstruct({.frames = 5,
+                                      .width = 96,
+                                      .height = 72,
+                                      .camera_offset = camera_offset,
+                                      .relief = relief},
+                                     Sim3{}),
+                         100);
+}
+
+TEST(SmallSimilarity, ParametersSurviveTheRoundTrip) {
+  const Vector7 parameters = (Vector7() << 0.3, -0.2, 1.1, 4, -5, 6, -0.4).finished();
+  const Eigen::Vector3d pivot(1, -2, 3);
+  EXPECT_LT((similarity_parameters(small_similarity(parameters, pivot), pivot) - parameters).norm(),
+            1e-12);
+  EXPECT_LT((similarity_parameters(Sim3{}, pivot)).norm(), 1e-15);
+}
+
+TEST(OrientedPoints, NormalsOfAPlaneFaceTheCameras) {
+  const OrientedPoints points = oriented_points(reconstruct({.frames = 3}, Sim3{}), 30);
+  ASSERT_GT(points.size(), 50u);
+  for (const auto& normal : points.normals)
+    EXPECT_LT((normal - Eigen::Vector3f(0, 0, -1)).norm(), 1e-3);
+}
+
+TEST(AlignRobust, RemovesAnErrorInAllSevenParameters) {
+  const RobustResult result = align_robust(points_of(bumps, 0), points_of(bumps, 0.13), kError, {});
+  EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
+  EXPECT_LT(result.cost_final, result.cost_initial);
+}
+
+TEST(AlignRobust, IsNotDrawnByAChange) {
+  const RobustResult result =
+      align_robust(points_of(bumps, 0), points_of(bumps_and_box, 0.13), kError, {});
+  EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.15 * difference(kError, {}).norm());
+  EXPECT_GT(result.rejected_far, 0);
+}
+
+TEST(AlignRobust, SaysThatAPlaneLeavesFourDirectionsOpen) {
+  const auto flat = [](double, double) { return 0.0; };
+  const RobustResult result = align_robust(points_of(flat, 0), points_of(flat, 0.13), kError, {});
+  // Sliding in the plane (2), turning in it, and scaling within it.
+  EXPECT_EQ(result.weak_directions.size(), 4u);
+  EXPECT_LT(result.constrained_share[3], 0.1);  // translation x
+  EXPECT_GT(result.constrained_share[5], 0.9);  // translation z, across the plane
+  // What the plane does not fix stays as it was given.
+  const Vector7 left = difference(result.t2_from_t1, kError);
+  EXPECT_LT(left.segment<2>(3).norm(), 1e-3);
+  EXPECT_NEAR(difference(result.t2_from_t1, {})[5], 0, 2e-3);
+}
+
+TEST(AlignRobust, ConstrainsEverythingOnARelief) {
+  const RobustResult result = align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, {});
+  EXPECT_THAT(result.weak_directions, testing::IsEmpty());
+  EXPECT_GT(result.constrained_share.minCoeff(), 0.5);
+  EXPECT_GT(result.covariance.diagonal().minCoeff(), 0);
+}
+
+TEST(AlignRobust, KeepsTheInitialAlignmentWithTooFewPairs) {
+  RobustOptions options;
+  options.min_pairs = 1'000'000;
+  const RobustResult result =
+      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), kError, options);
+  EXPECT_EQ(result.verdict, RobustVerdict::kKeptInitialFewPairs);
+  EXPECT_EQ(result.t2_from_t1.translation, kError.translation);
+}
+
+TEST(AlignRobust, EmptyCloudsKeepTheInitialAlignment) {
+  EXPECT_EQ(align_robust({}, {}, kError, {}).verdict, RobustVerdict::kKeptInitialFewPairs);
+}
+
+TEST(RobustOptions, RefuseANormalGateOfOne) {
+  RobustOptions options;
+  options.min_normal_cosine = 1;
+  EXPECT_THROW(options.validate(), Error);
+}
+
+}  // namespace
+}  // namespace vggtcd

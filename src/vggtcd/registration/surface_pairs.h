@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nearest pairs between two oriented clouds under a similarity, in both directions.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "vggtcd/geometry/nearest_neighbors.h"
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/scene/oriented_points.h"
+
+namespace vggtcd {
+
+// A point of T1 (already mapped into T2) and a point of T2 with the normal of the surface that was
+// searched, all in T2.
+struct SurfacePair {
+  Eigen::Vector3d moving;    // from T1
+  Eigen::Vector3d fixed;     // from T2
+  Eigen::Vector3d normal;    // of the target surface
+  double distance = 0;       // between the points
+  double normal_cosine = 0;  // |cos| between the two surfaces' normals
+  int32_t cluster = 0;       // the frame of the searching point; T2's frames follow T1's
+
+  double plane_residual() const { return normal.dot(moving - fixed); }
+};
+
+class SurfaceMatcher {
+ public:
+  // The clouds must outlive the matcher.
+  SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2);
+
+  // One pair per point of T1, then one per point of T2.
+  std::vector<SurfacePair> pairs(const Sim3& t2_from_t1) const;
+  int32_t num_clusters() const { return num_clusters_; }
+
+ private:
+  const OrientedPoints& t1_;
+  const OrientedPoints& t2_;
+  NearestNeighborIndex index_t1_;  // in T1's own frame: it does not move
+  NearestNeighborIndex index_t2_;
+  int32_t first_t2_cluster_ = 0;
+  int32_t num_clusters_ = 0;
+};
+
+}  // namespace vggtcd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points with surface normals, thinned to one per voxel: what surface registration works on.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+// Parallel arrays, positions and normals in the reconstruction's frame. Normals have length 1 and
+// point towards the camera that saw the point.
+struct OrientedPoints {
+  std::vector<Eigen::Vector3f> positions;
+  std::vector<Eigen::Vector3f> normals;
+  std::vector<int32_t> frames;  // the frame each point was taken from
+  double voxel_size_u = 0;
+
+  size_t size() const { return positions.size(); }
+};
+
+// The most confident pixel of each voxel (edge robust_extent / grid_resolution) among pixels above
+// the confidence threshold whose surface normal is defined: the cross product of the steps to the
+// pixels `radius_px` away on both sides, where none of the five depths jumps by more than 5 % and
+// the surface is not seen at a grazing angle (cosine below 0.1).
+OrientedPoints oriented_points(const Reconstruction& reconstruction, int grid_resolution,
+                               int radius_px = 2);
+
+}  // namespace vggtcd
