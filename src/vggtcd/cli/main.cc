@@ -27,6 +27,8 @@ int run(int argc, char** argv) {
   program.app.require_subcommand(1);
   program.app.footer(
       "'vggt-cd COMMAND --help' explains a command. Exit statuses: docs/formats.md.");
+  add_detect(program);
+  add_register(program);
   add_synthesize(program);
   try {
     program.app.parse(argc, argv);

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// The arguments that detect and register share: two epochs and what brings them together.
+#include "vggtcd/cli/epoch_arguments.h"
+
+namespace vggtcd::cli {
+
+void EpochArguments::add_to(CLI::App* command) {
+  command->add_option("BEFORE", before, "Predictions of the before epoch, T1 (.npz).")->required();
+  command->add_option("AFTER", after, "Predictions of the after epoch, T2 (.npz).")->required();
+  command->add_option("-o,--out", out, "Directory for the results; it appears when complete.")
+      ->required();
+  command
+      ->add_option("--joint", joint,
+                   "Predictions of the joint pass (.npz): K keyframes of T1, then K of T2, with "
+                   "keyframes_t1 and keyframes_t2.")
+      ->group("How the epochs come together (exactly one)");
+  command
+      ->add_option("--initial-sim3", initial_sim3,
+                   "A sim3.json with scale, rotation and translation: x_T2 = s R x_T1 + t.")
+      ->group("How the epochs come together (exactly one)");
+  command->add_flag("--aligned", aligned, "Both epochs are in one frame and scale already.")
+      ->group("How the epochs come together (exactly one)");
+}
+
+EpochInputs EpochArguments::inputs() const {
+  const int given = (joint.empty() ? 0 : 1) + (initial_sim3.empty() ? 0 : 1) + (aligned ? 1 : 0);
+  if (given != 1) {
+    throw_error(
+        ErrorCode::kUsage,
+        "expected exactly one of --joint FILE, --initial-sim3 FILE and --aligned, found {}: two "
+        "reconstructions have nothing in common otherwise",
+        given);
+  }
+  EpochInputs inputs;
+  inputs.before = before;
+  inputs.after = after;
+  if (!joint.empty()) inputs.joint = joint;
+  if (!initial_sim3.empty()) inputs.initial_sim3 = initial_sim3;
+  inputs.aligned = aligned;
+  return inputs;
+}
+
+}  // namespace vggtcd::cli

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// The arguments that detect and register share: two epochs and what brings them together.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "vggtcd/pipeline/detect.h"
+
+namespace vggtcd::cli {
+
+struct EpochArguments {
+  std::string before, after, joint, initial_sim3, out;
+  bool aligned = false;
+
+  void add_to(CLI::App* command);
+  // Throws Error{kUsage} unless exactly one of --joint, --initial-sim3 and --aligned was given.
+  EpochInputs inputs() const;
+};
+
+}  // namespace vggtcd::cli

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// vggt-cd register: the alignment of two epochs alone.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "vggtcd/cli/command.h"
+#include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/pipeline/detect.h"
+
+namespace vggtcd::cli {
+
+void add_register(Program& program) {
+  struct Arguments {
+    EpochArguments epochs;
+    AlignmentOptions options;
+    bool authors_layout = false;
+  };
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = add_command(
+      program, program.app, "register", "Align two epochs; no change detection.",
+      [arguments](ProgressSink& progress) {
+        const Alignment alignment =
+            register_epochs(arguments->epochs.inputs(), arguments->options,
+                            arguments->authors_layout, arguments->epochs.out, progress);
+        fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n", alignment.explanation,
+                   arguments->epochs.out, alignment.t2_from_t1.scale);
+      });
+  arguments->epochs.add_to(command);
+  add_fields(command, arguments->options, "Alignment");
+  command->add_flag("--authors-layout", arguments->authors_layout,
+                    "Also write the files that the paper's own evaluator reads: coarse_sim3.npz, "
+                    "fine_sim3.npz, pred_poses_t1.npy, pred_poses_t2.npy, timing.json.");
+  command->footer(
+      "Example:\n"
+      "  vggt-cd register t1.npz t2.npz --joint joint.npz -o out\n\n"
+      "out/sim3.json maps T1 into T2: x_T2 = scale * rotation * x_T1 + translation.");
+}
+
+}  // namespace vggtcd::cli

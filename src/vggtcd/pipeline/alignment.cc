@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// Alignment of two epochs: which stages ran, what each one found, and what was chosen.
+#include "vggtcd/pipeline/alignment.h"
+
+namespace vggtcd {
+
+std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod) {
+  static constexpr EnumName<AlignmentMethod> kNames[] = {{AlignmentMethod::kCoarse, "coarse"},
+                                                         {AlignmentMethod::kPaper, "paper"}};
+  return kNames;
+}
+
+void AlignmentOptions::validate() const {
+  coarse.validate();
+  fine.validate();
+}
+
+Alignment align(const Reconstruction& before, const Reconstruction& after,
+                const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
+  Alignment result;
+  result.initial_source = initial.source;
+  if (initial.joint) {
+    log.run("coarse alignment", [&](ProgressStage&) {
+      result.coarse = align_coarse(before, after, *initial.joint, options.coarse);
+    });
+    result.initial_t2_from_t1 = result.coarse->t2_from_t1;
+    result.chosen = result.verdict = "coarse";
+    result.explanation = fmt::format(
+        "Aligned through the joint pass over {} and {} keyframes; residuals {:.3g} and {:.3g} in "
+        "its "
+        "units.",
+        initial.joint->keyframes_t1.size(), initial.joint->keyframes_t2.size(),
+        result.coarse->t1.rms_residual_u, result.coarse->t2.rms_residual_u);
+  } else {
+    result.initial_t2_from_t1 = initial.t2_from_t1;
+    result.chosen = "initial";
+    result.verdict = "given";
+    result.explanation = fmt::format("The alignment was given ({}).", initial.source);
+  }
+  result.t2_from_t1 = result.initial_t2_from_t1;
+
+  if (options.method == AlignmentMethod::kPaper) {
+    log.run("fine alignment", [&](ProgressStage&) {
+      result.fine = align_fine(before, after, result.initial_t2_from_t1, options.fine);
+    });
+    result.t2_from_t1 = result.fine->t2_from_t1;
+    if (result.fine->verdict == FineVerdict::kRefined) result.chosen = "fine";
+    result.verdict = enum_to_string(result.fine->verdict);
+    result.explanation = result.fine->explanation;
+  }
+  return result;
+}
+
+}  // namespace vggtcd

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// Alignment of two epochs: which stages ran, what each one found, and what was chosen.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "vggtcd/core/options.h"
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/pipeline/stage_log.h"
+#include "vggtcd/registration/coarse.h"
+#include "vggtcd/registration/fine.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+enum class AlignmentMethod {
+  kCoarse,  // the initial similarity as it is
+  kPaper    // and Algorithm 1 on top of it
+};
+std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
+
+struct AlignmentOptions {
+  AlignmentMethod method = AlignmentMethod::kPaper;
+  bool shared_intrinsics = false;
+  CoarseOptions coarse;
+  FineOptions fine;
+
+  static constexpr auto fields = [](auto&& self, auto&& field) {
+    field("method", self.method,
+          "coarse: the joint pass alone. paper: coarse, then the paper's translation refinement "
+          "with its "
+          "residual self-check.");
+    field("shared_intrinsics", self.shared_intrinsics,
+          "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
+          "match, as "
+          "the authors' own script does.");
+    field("coarse", self.coarse, "");
+    field("fine", self.fine, "");
+  };
+  void validate() const;
+};
+
+// Where the similarity before refinement comes from.
+struct InitialAlignment {
+  const JointReconstruction* joint = nullptr;  // the coarse stage estimates it, or:
+  Sim3 t2_from_t1;                             // it is given
+  std::string source;                          // "joint pass", "aligned epochs", or a file name
+};
+
+struct Alignment {
+  Sim3 t2_from_t1;                     // chosen: x_T2 = s R x_T1 + t
+  Sim3 initial_t2_from_t1;             // before refinement
+  std::string initial_source;          // as in InitialAlignment
+  std::optional<CoarseResult> coarse;  // with a joint pass
+  std::optional<FineResult> fine;      // with method paper
+  std::string chosen;                  // "coarse", "fine" or "initial"
+  std::string verdict;                 // machine-readable: refined, kept_coarse_..., coarse, given
+  std::string explanation;             // one sentence
+};
+
+// Runs the stages that the method asks for. Reconstructions are as read; with shared_intrinsics the
+// caller has applied share_intrinsics to all of them.
+Alignment align(const Reconstruction& before, const Reconstruction& after,
+                const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log);
+
+}  // namespace vggtcd

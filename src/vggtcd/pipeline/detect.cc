@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole job as numbered stages: two reconstructed epochs in, an aligned 3D change map out.
+#include "vggtcd/pipeline/detect.h"
+
+#include "vggtcd/core/version.h"
+#include "vggtcd/io/json_file.h"
+#include "vggtcd/io/output_directory.h"
+#include "vggtcd/io/predictions.h"
+#include "vggtcd/io/sim3_file.h"
+#include "vggtcd/pipeline/results.h"
+#include "vggtcd/registration/shared_intrinsics.h"
+
+namespace vggtcd {
+namespace {
+
+struct Epochs {
+  Reconstruction before, after;
+  std::optional<JointReconstruction> joint;
+  InitialAlignment initial;
+};
+
+// 1. Read.
+Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, StageLog& log) {
+  Epochs epochs;
+  log.run("read predictions", [&](ProgressStage& stage) {
+    epochs.before = read_reconstruction(inputs.before, log.progress());
+    stage.advance(0.4);
+    epochs.after = read_reconstruction(inputs.after, log.progress());
+    stage.advance(0.8);
+    if (inputs.joint) {
+      epochs.joint = read_joint(*inputs.joint, epochs.before, epochs.after, log.progress());
+    }
+    if (options.shared_intrinsics) {
+      share_intrinsics(epochs.before);
+      share_intrinsics(epochs.after);
+      if (epochs.joint) share_intrinsics(epochs.joint->reconstruction);
+    }
+  });
+  if (epochs.joint) {
+    epochs.initial = {&*epochs.joint, {}, "joint pass"};
+  } else if (inputs.initial_sim3) {
+    epochs.initial = {nullptr, read_sim3(*inputs.initial_sim3),
+                      inputs.initial_sim3->filename().string()};
+  } else {
+    epochs.initial = {nullptr, {}, "epochs already in one frame"};
+  }
+  return epochs;
+}
+
+Json inputs_json(const EpochInputs& inputs, const Epochs& epochs) {
+  const auto epoch = [](const std::filesystem::path& path, const Reconstruction& r) {
+    return Json{{"file", path.filename().string()},
+                {"frames", r.num_frames()},
+                {"width", r.width},
+                {"height", r.height}};
+  };
+  Json json = {{"before", epoch(inputs.before, epochs.before)},
+               {"after", epoch(inputs.after, epochs.after)}};
+  if (epochs.joint) {
+    json["joint"] = epoch(*inputs.joint, epochs.joint->reconstruction);
+    json["joint"]["keyframes_t1"] = epochs.joint->keyframes_t1;
+    json["joint"]["keyframes_t2"] = epochs.joint->keyframes_t2;
+  }
+  if (inputs.initial_sim3) json["initial_sim3"] = inputs.initial_sim3->filename().string();
+  return json;
+}
+
+Json summary_head(const char* command, const EpochInputs& inputs, const Epochs& epochs) {
+  return {{"program", "vggt-cd"},
+          {"version", kVersion},
+          {"command", command},
+          {"inputs", inputs_json(inputs, epochs)}};
+}
+
+}  // namespace
+
+void DetectOptions::validate() const {
+  alignment.validate();
+  change.validate();
+}
+
+DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
+                     const std::filesystem::path& out, ProgressSink& progress) {
+  options.validate();
+  OutputDirectory directory(out);
+  StageLog log(progress);
+  DetectOutcome outcome;
+
+  // 1. Read the epochs and what brings them together.
+  Epochs epochs = read_epochs(inputs, options.alignment, log);
+  Json summary = summary_head("detect", inputs, epochs);
+
+  // 2. Align: coarse, fine.
+  outcome.alignment = align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
+  const Sim3& t2_from_t1 = outcome.alignment.t2_from_t1;
+  epochs.joint.reset();
+
+  // 3. Compare.
+  ChangeSet changes;
+  log.run("change detection", [&](ProgressStage&) {
+    changes = detect_changes(epochs.before, epochs.after, t2_from_t1, options.change);
+  });
+  outcome.points_t1 = changes.t1.points;
+  outcome.changed_t1 = changes.t1.changed;
+  outcome.points_t2 = changes.t2.points;
+  outcome.changed_t2 = changes.t2.changed;
+
+  // 4. Write.
+  const std::filesystem::path& aside = directory.path();
+  log.run("write results", [&](ProgressStage& stage) {
+    write_json_file(aside / "sim3.json", sim3_json(outcome.alignment));
+    write_cameras(aside, epochs.before, epochs.after, t2_from_t1);
+    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes);
+    stage.advance(0.2);
+    write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes);
+    stage.advance(0.4);
+    write_change_ply(aside / "after.ply", epochs.after, {}, changes.t2, changes);
+    stage.advance(0.6);
+    if (options.overlays) {
+      write_overlays(aside / "overlays" / "before", epochs.before, changes.t1, changes);
+      stage.advance(0.8);
+      write_overlays(aside / "overlays" / "after", epochs.after, changes.t2, changes);
+    }
+  });
+  summary["options"] = options_to_json(options);
+  summary["alignment"] = alignment_json(outcome.alignment);
+  summary["change"] = change_json(changes);
+  summary["stages"] = stages_json(log);
+  write_json_file(aside / "summary.json", summary);
+  directory.commit();
+  return outcome;
+}
+
+Alignment register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
+                          bool authors_layout, const std::filesystem::path& out,
+                          ProgressSink& progress) {
+  options.validate();
+  OutputDirectory directory(out);
+  StageLog log(progress);
+  Epochs epochs = read_epochs(inputs, options, log);
+  Json summary = summary_head("register", inputs, epochs);
+  const Alignment alignment = align(epochs.before, epochs.after, epochs.initial, options, log);
+  log.run("write results", [&](ProgressStage&) {
+    write_json_file(directory.path() / "sim3.json", sim3_json(alignment));
+    if (authors_layout) {
+      write_authors_layout(directory.path(), epochs.before, epochs.after, alignment, log);
+    }
+  });
+  summary["options"] = Json{{"alignment", options_to_json(options)}};
+  summary["alignment"] = alignment_json(alignment);
+  summary["stages"] = stages_json(log);
+  write_json_file(directory.path() / "summary.json", summary);
+  directory.commit();
+  return alignment;
+}
+
+}  // namespace vggtcd

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The whole job as numbered stages: two reconstructed epochs in, an aligned 3D change map out.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "vggtcd/change/nearest_distance.h"
+#include "vggtcd/pipeline/alignment.h"
+
+namespace vggtcd {
+
+// Which files, and how the epochs are first brought together: exactly one of the last three.
+struct EpochInputs {
+  std::filesystem::path before;  // prediction files, docs/formats.md
+  std::filesystem::path after;
+  std::optional<std::filesystem::path> joint;         // the joint pass over keyframes of both
+  std::optional<std::filesystem::path> initial_sim3;  // a sim3.json: t2_from_t1
+  bool aligned = false;                               // both epochs are in one frame already
+};
+
+struct DetectOptions {
+  AlignmentOptions alignment;
+  ChangeOptions change;
+  bool overlays = true;
+
+  static constexpr auto fields = [](auto&& self, auto&& field) {
+    field("alignment", self.alignment, "");
+    field("change", self.change, "");
+    field("overlays", self.overlays, "Write overlays/: each photo beside its heat map.");
+  };
+  void validate() const;
+};
+
+// Aligns, finds the changes and writes everything that docs/formats.md lists under "Results of
+// detect" into `out`, which appears when it is complete. Returns the alignment verdict's sentence
+// and the changed shares for the terminal.
+struct DetectOutcome {
+  Alignment alignment;
+  int64_t points_t1 = 0, changed_t1 = 0;
+  int64_t points_t2 = 0, changed_t2 = 0;
+};
+DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
+                     const std::filesystem::path& out, ProgressSink& progress);
+
+// Alignment only: writes sim3.json and summary.json, and with authors_layout the files that the
+// authors' evaluator reads.
+Alignment register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
+                          bool authors_layout, const std::filesystem::path& out,
+                          ProgressSink& progress);
+
+}  // namespace vggtcd

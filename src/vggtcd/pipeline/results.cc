@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files that detect and register leave behind; docs/formats.md describes each one.
+#include "vggtcd/pipeline/results.h"
+
+#include <cmath>
+
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/io/colmap.h"
+#include "vggtcd/io/image_write.h"
+#include "vggtcd/io/npz.h"
+#include "vggtcd/io/ply.h"
+#include "vggtcd/io/sim3_file.h"
+#include "vggtcd/io/trajectory.h"
+#include "vggtcd/io/tum.h"
+#include "vggtcd/report/heat_map.h"
+#include "vggtcd/scene/point_cloud.h"
+
+namespace vggtcd {
+namespace {
+
+Json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json epoch_to_joint_json(const EpochToJoint& epoch) {
+  return {{"joint_from_epoch", sim3_to_json(epoch.joint_from_epoch)},
+          {"candidates", epoch.candidates},
+          {"correspondences", epoch.correspondences},
+          {"rms_residual_u", epoch.rms_residual_u}};
+}
+
+Json fine_json(const FineResult& fine) {
+  return {{"verdict", enum_to_string(fine.verdict)},
+          {"explanation", fine.explanation},
+          {"voxel_size_t1_u", fine.voxel_size_t1_u},
+          {"voxel_size_t2_u", fine.voxel_size_t2_u},
+          {"points_t1", fine.points_t1},
+          {"points_t2", fine.points_t2},
+          {"static_points", fine.static_points},
+          {"median_residual_coarse_u", fine.median_residual_coarse_u},
+          {"median_residual_fine_u",
+           fine.median_residual_fine_u ? Json(*fine.median_residual_fine_u) : Json(nullptr)},
+          {"translation_update_u", vector_json(fine.translation_update_u)}};
+}
+
+Json epoch_change_json(const EpochChange& change) {
+  return {{"points", change.points},
+          {"changed", change.changed},
+          {"changed_share", change.points > 0 ? static_cast<double>(change.changed) /
+                                                    static_cast<double>(change.points)
+                                              : 0.0}};
+}
+
+std::vector<uint8_t> changed_mask(const EpochChange& change, const ChangeSet& changes) {
+  std::vector<uint8_t> mask(change.score.size());
+  for (size_t i = 0; i < mask.size(); ++i) mask[i] = changes.changed(change.score[i]) ? 1 : 0;
+  return mask;
+}
+
+Trajectory trajectory_of(const std::vector<View>& views) {
+  Trajectory trajectory;
+  for (const View& view : views) trajectory.push_back({view.name, view.camera_from_world});
+  return trajectory;
+}
+
+}  // namespace
+
+Json sim3_json(const Alignment& alignment) {
+  Json json = sim3_to_json(alignment.t2_from_t1);
+  json["maps"] = "x_T2 = scale * rotation * x_T1 + translation";
+  json["chosen"] = alignment.chosen;
+  json["verdict"] = alignment.verdict;
+  json["explanation"] = alignment.explanation;
+  json["initial"] = sim3_to_json(alignment.initial_t2_from_t1);
+  json["initial"]["source"] = alignment.initial_source;
+  if (alignment.coarse) json["coarse"] = sim3_to_json(alignment.coarse->t2_from_t1);
+  if (alignment.fine) json["fine"] = sim3_to_json(alignment.fine->t2_from_t1);
+  return json;
+}
+
+Json alignment_json(const Alignment& alignment) {
+  Json json;
+  json["chosen"] = alignment.chosen;
+  json["verdict"] = alignment.verdict;
+  json["explanation"] = alignment.explanation;
+  json["scale_t2_from_t1"] = alignment.t2_from_t1.scale;
+  json["initial_source"] = alignment.initial_source;
+  if (alignment.coarse) {
+    json["coarse"] = {{"t1", epoch_to_joint_json(alignment.coarse->t1)},
+                      {"t2", epoch_to_joint_json(alignment.coarse->t2)}};
+  }
+  if (alignment.fine) json["fine"] = fine_json(*alignment.fine);
+  return json;
+}
+
+Json change_json(const ChangeSet& changes) {
+  return {{"scene_extent_u", changes.scene_extent_u},
+          {"threshold_u", changes.threshold_u},
+          {"bound_u", changes.bound_u},
+          {"t1", epoch_change_json(changes.t1)},
+          {"t2", epoch_change_json(changes.t2)}};
+}
+
+Json stages_json(const StageLog& log) {
+  Json json = Json::array();
+  for (const StageRecord& record : log.records()) {
+    json.push_back({{"name", record.name},
+                    {"seconds", record.seconds},
+                    {"peak_memory_bytes", record.peak_memory_bytes}});
+  }
+  return json;
+}
+
+void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
+                      const Sim3& t2_from_epoch, const EpochChange& change,
+                      const ChangeSet& changes) {
+  const std::string comments[] = {"frame: T2, model units"};
+  PlyWriter writer(path, static_cast<size_t>(change.points),
+                   {"change_distance", "changed", "confidence"}, comments);
+  for (int frame = 0; frame < epoch.num_frames(); ++frame) {
+    const PixelRays rays(epoch.views[static_cast<size_t>(frame)], t2_from_epoch);
+    size_t pixel = static_cast<size_t>(frame) * epoch.pixels_per_frame();
+    for (int v = 0; v < epoch.height; ++v) {
+      for (int u = 0; u < epoch.width; ++u, ++pixel) {
+        const float score = change.score[pixel];
+        if (std::isnan(score)) continue;
+        const float values[] = {score, changes.changed(score) ? 1.0f : 0.0f,
+                                epoch.confidence[pixel]};
+        writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel], values);
+      }
+    }
+  }
+  writer.commit();
+}
+
+void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
+                      const Reconstruction& after, const ChangeSet& changes) {
+  const auto shape = [](const Reconstruction& r) {
+    return std::vector<int64_t>{r.num_frames(), r.height, r.width};
+  };
+  const std::vector<uint8_t> mask_t1 = changed_mask(changes.t1, changes);
+  const std::vector<uint8_t> mask_t2 = changed_mask(changes.t2, changes);
+  NpzWriter writer(path);
+  writer.add<float>("score_t1", shape(before), changes.t1.score);
+  writer.add<float>("score_t2", shape(after), changes.t2.score);
+  writer.add_mask("changed_t1", shape(before), mask_t1);
+  writer.add_mask("changed_t2", shape(after), mask_t2);
+  writer.finish();
+}
+
+void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,
+                    const EpochChange& change, const ChangeSet& changes) {
+  std::filesystem::create_directories(directory);
+  const size_t per_frame = epoch.pixels_per_frame();
+  parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
+    const size_t index = static_cast<size_t>(frame);
+    const Image overlay =
+        render_overlay(epoch.frame_color(static_cast<int>(frame)),
+                       std::span(change.score).subspan(index * per_frame, per_frame), epoch.height,
+                       epoch.width, {changes.threshold_u, changes.bound_u});
+    const std::string stem = std::filesystem::path(epoch.views[index].name).stem().string();
+    write_png(directory / (stem + ".png"), overlay);
+  });
+}
+
+std::vector<View> views_in_t2(const Reconstruction& epoch, const Sim3& t2_from_epoch,
+                              const std::string& name_prefix) {
+  std::vector<View> views = epoch.views;
+  for (View& view : views) {
+    view.camera_from_world = camera_from_new_world(view.camera_from_world, t2_from_epoch);
+    view.name = name_prefix + view.name;
+  }
+  return views;
+}
+
+void write_cameras(const std::filesystem::path& directory, const Reconstruction& before,
+                   const Reconstruction& after, const Sim3& t2_from_t1) {
+  std::vector<View> views = views_in_t2(before, t2_from_t1, "before/");
+  const std::vector<View> views_t2 = views_in_t2(after, {}, "after/");
+  write_tum(directory / "cameras_before.tum", trajectory_of(views));
+  write_tum(directory / "cameras_after.tum", trajectory_of(views_t2));
+  views.insert(views.end(), views_t2.begin(), views_t2.end());
+  std::filesystem::create_directories(directory / "colmap");
+  write_colmap_text(directory / "colmap", views);
+}
+
+void write_authors_layout(const std::filesystem::path& directory, const Reconstruction& before,
+                          const Reconstruction& after, const Alignment& alignment,
+                          const StageLog& log) {
+  write_sim3_npz(directory / "coarse_sim3.npz", alignment.initial_t2_from_t1);
+  write_sim3_npz(directory / "fine_sim3.npz", alignment.t2_from_t1);
+  constexpr PoseConvention kTheirs = PoseConvention::kCameraFromWorld;
+  write_npy_poses(directory / "pred_poses_t1.npy", trajectory_of(before.views), kTheirs);
+  write_npy_poses(directory / "pred_poses_t2.npy", trajectory_of(after.views), kTheirs);
+  // Their keys; what is theirs alone (the network's own time) is not invented.
+  Json timing = {{"coarse", 0.0}, {"fine", 0.0}, {"total", 0.0}};
+  int64_t peak = 0;
+  for (const StageRecord& record : log.records()) {
+    if (record.name == "coarse alignment") timing["coarse"] = record.seconds;
+    if (record.name == "fine alignment") timing["fine"] = record.seconds;
+    peak = std::max(peak, record.peak_memory_bytes);
+  }
+  timing["total"] = timing["coarse"].get<double>() + timing["fine"].get<double>();
+  timing["paper_eval_time"] = timing["total"];
+  timing["peak_memory_MB"] = static_cast<double>(peak) / 1e6;
+  write_json_file(directory / "timing.json", timing);
+}
+
+}  // namespace vggtcd

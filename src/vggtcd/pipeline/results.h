@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The files that detect and register leave behind; docs/formats.md describes each one.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "vggtcd/change/nearest_distance.h"
+#include "vggtcd/io/json_file.h"
+#include "vggtcd/pipeline/alignment.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+// sim3.json: the chosen similarity at the top level, then each stage's.
+Json sim3_json(const Alignment& alignment);
+
+// The "alignment" part of summary.json: verdict, counts, residuals.
+Json alignment_json(const Alignment& alignment);
+
+// The "change" part: thresholds and counts.
+Json change_json(const ChangeSet& changes);
+
+// The "stages" part.
+Json stages_json(const StageLog& log);
+
+// All functions below write into an existing directory and throw Error{kOutput}.
+
+// A point of every pixel with evidence, in the frame of T2: colour, change_distance, changed,
+// confidence.
+void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
+                      const Sim3& t2_from_epoch, const EpochChange& change,
+                      const ChangeSet& changes);
+
+// change.npz: score_t1, score_t2 f32, changed_t1, changed_t2 bool, all [S, H, W].
+void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
+                      const Reconstruction& after, const ChangeSet& changes);
+
+// One PNG per photo into `directory`, named like the photo.
+void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,
+                    const EpochChange& change, const ChangeSet& changes);
+
+// The views of an epoch with their poses and names in the frame of T2.
+std::vector<View> views_in_t2(const Reconstruction& epoch, const Sim3& t2_from_epoch,
+                              const std::string& name_prefix);
+
+// cameras_before.tum, cameras_after.tum and colmap/ (text) of the cameras of both epochs.
+void write_cameras(const std::filesystem::path& directory, const Reconstruction& before,
+                   const Reconstruction& after, const Sim3& t2_from_t1);
+
+// The layout of the authors' inference script, so that their evaluator runs unchanged:
+// {coarse,fine}_sim3.npz with s, R, t; pred_poses_{t1,t2}.npy (N,4,4) camera-from-world in each
+// epoch's own frame; timing.json.
+void write_authors_layout(const std::filesystem::path& directory, const Reconstruction& before,
+                          const Reconstruction& after, const Alignment& alignment,
+                          const StageLog& log);
+
+}  // namespace vggtcd
