@@ -5,39 +5,46 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/pipeline/stage_log.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
+#include "vggtcd/registration/robust.h"
 #include "vggtcd/scene/reconstruction.h"
 
 namespace vggtcd {
 
 enum class AlignmentMethod {
   kCoarse,  // the initial similarity as it is
-  kPaper    // and Algorithm 1 on top of it
+  kPaper,   // and Algorithm 1 on top of it
+  kRobust   // the best of initial, Algorithm 1 and the robust Sim(3) refinement
 };
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
 
 struct AlignmentOptions {
-  AlignmentMethod method = AlignmentMethod::kPaper;
+  AlignmentMethod method = AlignmentMethod::kRobust;
   bool shared_intrinsics = false;
   CoarseOptions coarse;
   FineOptions fine;
+  RobustOptions robust;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("method", self.method,
-          "coarse: the joint pass alone. paper: coarse, then the paper's translation refinement "
-          "with its "
-          "residual self-check.");
+          "robust: all seven parameters from the static surfaces, and change by free-space votes. "
+          "paper: the "
+          "paper's translation refinement with its residual self-check, and change by "
+          "nearest-neighbour "
+          "distance. coarse: the joint pass alone, change as in paper.");
     field("shared_intrinsics", self.shared_intrinsics,
           "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
           "match, as "
           "the authors' own script does.");
     field("coarse", self.coarse, "");
     field("fine", self.fine, "");
+    field("robust", self.robust, "");
   };
   void validate() const;
 };
@@ -54,10 +61,18 @@ struct Alignment {
   Sim3 initial_t2_from_t1;             // before refinement
   std::string initial_source;          // as in InitialAlignment
   std::optional<CoarseResult> coarse;  // with a joint pass
-  std::optional<FineResult> fine;      // with method paper
-  std::string chosen;                  // "coarse", "fine" or "initial"
-  std::string verdict;                 // machine-readable: refined, kept_coarse_..., coarse, given
-  std::string explanation;             // one sentence
+  std::optional<FineResult> fine;      // with methods paper and robust
+  std::optional<RobustResult> robust;  // with method robust
+  // With method robust: what was compared, by surface_cost at one scale; the smallest was chosen.
+  struct Candidate {
+    std::string name;
+    Sim3 t2_from_t1;
+    double cost = 0;
+  };
+  std::vector<Candidate> candidates;
+  std::string chosen;       // "coarse", "fine", "robust" or "initial"
+  std::string verdict;      // machine-readable: refined, kept_coarse_..., coarse, given
+  std::string explanation;  // one sentence
 };
 
 // Runs the stages that the method asks for. Reconstructions are as read; with shared_intrinsics the

@@ -41,6 +41,35 @@ Json fine_json(const FineResult& fine) {
           {"translation_update_u", vector_json(fine.translation_update_u)}};
 }
 
+Json robust_json(const RobustResult& robust) {
+  Json json = {{"verdict", enum_to_string(robust.verdict)},
+               {"explanation", robust.explanation},
+               {"iterations", robust.iterations},
+               {"points_t1", robust.points_t1},
+               {"points_t2", robust.points_t2},
+               {"pairs", robust.pairs},
+               {"effective_pairs", robust.effective_pairs},
+               {"rejected_far", robust.rejected_far},
+               {"rejected_normal", robust.rejected_normal},
+               {"residual_sigma_u", robust.residual_sigma_u},
+               {"cost_initial", robust.cost_initial},
+               {"cost_final", robust.cost_final},
+               {"pivot_in_t2", vector_json(robust.pivot_in_t2)},
+               {"weak_directions", robust.weak_directions}};
+  for (size_t i = 0; i < kDegreesOfFreedom.size(); ++i) {
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    json["degrees_of_freedom"][std::string(kDegreesOfFreedom[i])] = {
+        {"sigma", std::sqrt(robust.covariance(k, k))},
+        {"constrained_share", robust.constrained_share[k]}};
+  }
+  for (int row = 0; row < 7; ++row) {
+    Json values = Json::array();
+    for (int column = 0; column < 7; ++column) values.push_back(robust.covariance(row, column));
+    json["covariance"].push_back(values);
+  }
+  return json;
+}
+
 Json epoch_change_json(const EpochChange& change) {
   return {{"points", change.points},
           {"changed", change.changed},
@@ -73,6 +102,7 @@ Json sim3_json(const Alignment& alignment) {
   json["initial"]["source"] = alignment.initial_source;
   if (alignment.coarse) json["coarse"] = sim3_to_json(alignment.coarse->t2_from_t1);
   if (alignment.fine) json["fine"] = sim3_to_json(alignment.fine->t2_from_t1);
+  if (alignment.robust) json["robust"] = sim3_to_json(alignment.robust->t2_from_t1);
   return json;
 }
 
@@ -88,6 +118,10 @@ Json alignment_json(const Alignment& alignment) {
                       {"t2", epoch_to_joint_json(alignment.coarse->t2)}};
   }
   if (alignment.fine) json["fine"] = fine_json(*alignment.fine);
+  if (alignment.robust) json["robust"] = robust_json(*alignment.robust);
+  for (const Alignment::Candidate& candidate : alignment.candidates) {
+    json["candidates"].push_back({{"name", candidate.name}, {"surface_cost", candidate.cost}});
+  }
   return json;
 }
 

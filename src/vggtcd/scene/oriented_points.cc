@@ -2,7 +2,7 @@
 // Points with surface normals, thinned to one per voxel: what surface registration works on.
 #include "vggtcd/scene/oriented_points.h"
 
-#include <Eigen/Geometry>
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -18,35 +18,47 @@ namespace {
 
 constexpr double kMaxDepthStep = 0.05;  // of the depth itself: beyond it lies another surface
 constexpr double kMinCosine = 0.1;      // to the viewing ray
+constexpr double kMinSupport = 0.6;     // of the window's pixels that lie on the surface
 
+// The inverse depth of a plane is linear in the pixel: n . x = d and x = z K^-1 (u, v, 1) give
+// 1 / z = (n / d) . K^-1 (u, v, 1). The least-squares fit of that line over the window is a plane
+// fit that one pixel's depth noise hardly moves.
 std::optional<Eigen::Vector3f> normal_at(const Reconstruction& r, uint32_t pixel, int radius_px) {
   const size_t in_frame = pixel % r.pixels_per_frame();
   const int u = static_cast<int>(in_frame % static_cast<size_t>(r.width));
   const int v = static_cast<int>(in_frame / static_cast<size_t>(r.width));
-  if (u < radius_px || v < radius_px || u + radius_px >= r.width || v + radius_px >= r.height)
+  if (u < radius_px || v < radius_px || u + radius_px >= r.width || v + radius_px >= r.height) {
     return {};
-  const View& view = r.views[pixel / r.pixels_per_frame()];
-  const auto depth_at = [&](int du, int dv) {
-    return static_cast<double>(
-        r.depth[static_cast<size_t>(static_cast<int64_t>(pixel) + du + int64_t{dv} * r.width)]);
-  };
-  const double depth = depth_at(0, 0);
-  const auto point_at = [&](int du, int dv) {
-    return view.pinhole.unproject(u + du, v + dv, depth_at(du, dv));
-  };
-  for (const auto& [du, dv] :
-       {std::pair{radius_px, 0}, {-radius_px, 0}, {0, radius_px}, {0, -radius_px}}) {
-    if (std::abs(depth_at(du, dv) - depth) > kMaxDepthStep * depth)
-      return {};  // also where depth is 0
   }
-  // u to the right, v down: their cross product points away from the camera.
-  const Eigen::Vector3d step_u = point_at(radius_px, 0) - point_at(-radius_px, 0);
-  const Eigen::Vector3d step_v = point_at(0, radius_px) - point_at(0, -radius_px);
-  const Eigen::Vector3d cross = step_v.cross(step_u);
-  const double length = cross.norm();
-  const Eigen::Vector3d ray = point_at(0, 0);
-  if (!(length > 0) || std::abs(cross.dot(ray)) < kMinCosine * length * ray.norm()) return {};
-  return (view.camera_from_world.rotation.transpose() * (cross / length)).cast<float>();
+  const double depth = static_cast<double>(r.depth[pixel]);
+  Eigen::Matrix3d normal_matrix = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+  int support = 0;
+  for (int dv = -radius_px; dv <= radius_px; ++dv) {
+    for (int du = -radius_px; du <= radius_px; ++du) {
+      const float other = r.depth[static_cast<size_t>(int64_t{pixel} + du + int64_t{dv} * r.width)];
+      if (std::abs(static_cast<double>(other) - depth) > kMaxDepthStep * depth)
+        continue;  // also depth 0
+      const Eigen::Vector3d row(du, dv, 1);
+      normal_matrix += row * row.transpose();
+      right_side += row / static_cast<double>(other);
+      ++support;
+    }
+  }
+  const int window = (2 * radius_px + 1) * (2 * radius_px + 1);
+  if (support < kMinSupport * window) return {};
+  const Eigen::Vector3d line = normal_matrix.ldlt().solve(right_side);  // about this pixel
+  const View& view = r.views[pixel / r.pixels_per_frame()];
+  const Pinhole& camera = view.pinhole;
+  // Its value at the principal point is the third component of n / d.
+  Eigen::Vector3d normal(line[0] * camera.fx, line[1] * camera.fy,
+                         line[2] + line[0] * (camera.cx - u) + line[1] * (camera.cy - v));
+  normal.normalize();
+  const Eigen::Vector3d ray = camera.unproject(u, v, 1.0).normalized();
+  const double cosine = normal.dot(ray);
+  if (!(std::abs(cosine) >= kMinCosine)) return {};  // grazing, or not a number
+  if (cosine > 0) normal = -normal;                  // towards the camera
+  return (view.camera_from_world.rotation.transpose() * normal).cast<float>();
 }
 
 }  // namespace

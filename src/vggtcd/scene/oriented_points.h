@@ -22,10 +22,10 @@ struct OrientedPoints {
 };
 
 // The most confident pixel of each voxel (edge robust_extent / grid_resolution) among pixels above
-// the confidence threshold whose surface normal is defined: the cross product of the steps to the
-// pixels `radius_px` away on both sides, where none of the five depths jumps by more than 5 % and
-// the surface is not seen at a grazing angle (cosine below 0.1).
+// the confidence threshold whose surface normal is defined: a plane fitted to the depths in the
+// square window of radius_px around the pixel that differ from its own by less than 5 %, if they
+// are at least 60 % of the window and the plane is not seen at a grazing angle (cosine below 0.1).
 OrientedPoints oriented_points(const Reconstruction& reconstruction, int grid_resolution,
-                               int radius_px = 2);
+                               int radius_px = 4);
 
 }  // namespace vggtcd
