@@ -25,7 +25,7 @@ enum class AlignmentMethod {
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
 
 struct AlignmentOptions {
-  AlignmentMethod method = AlignmentMethod::kRobust;
+  AlignmentMethod method = AlignmentMethod::kPaper;
   bool shared_intrinsics = false;
   CoarseOptions coarse;
   FineOptions fine;
