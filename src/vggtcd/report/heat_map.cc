@@ -17,6 +17,8 @@ namespace {
 constexpr int kGap = 4;            // px between the photo and its heat map
 constexpr int kLegendHeight = 34;  // px below them
 constexpr double kFontScale = 0.4;
+constexpr int kMinPanelWidth =
+    360;  // px: smaller photos are enlarged so that the legend can be read
 
 cv::Scalar grey(int level) { return cv::Scalar::all(level); }
 
@@ -65,17 +67,20 @@ Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score,
   const size_t pixels = static_cast<size_t>(height) * static_cast<size_t>(width);
   check(rgb.size() == 3 * pixels && score.size() == pixels, "render_overlay: sizes");
   check(scale.bound_u > 0, "render_overlay: positive bound");
-  Image out(2 * width + kGap, height + kLegendHeight);
+  const int zoom = std::max(1, (kMinPanelWidth + width - 1) / width);
+  const int panel_width = zoom * width, panel_height = zoom * height;
+  Image out(2 * panel_width + kGap, panel_height + kLegendHeight);
   cv::Mat canvas(out.height, out.width, CV_8UC3, out.rgb.data());
   canvas.setTo(grey(24));
   const float bound = static_cast<float>(scale.bound_u);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const size_t i = static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+  for (int y = 0; y < panel_height; ++y) {
+    for (int x = 0; x < panel_width; ++x) {
+      const size_t i = static_cast<size_t>(y / zoom) * static_cast<size_t>(width) +
+                       static_cast<size_t>(x / zoom);
       const uint8_t* source = &rgb[3 * i];
       std::copy_n(source, 3, out.pixel(x, y));
       const float luma = 0.299f * source[0] + 0.587f * source[1] + 0.114f * source[2];
-      uint8_t* target = out.pixel(width + kGap + x, y);
+      uint8_t* target = out.pixel(panel_width + kGap + x, y);
       if (std::isnan(score[i])) {
         std::fill_n(target, 3, static_cast<uint8_t>(0.45f * luma));
         continue;
@@ -87,8 +92,8 @@ Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score,
       }
     }
   }
-  draw_text(canvas, "grey: no evidence", width / 2, height + 20);
-  draw_legend(canvas, width + kGap, height, width, scale);
+  draw_text(canvas, "grey: no evidence", panel_width / 2, panel_height + 20);
+  draw_legend(canvas, panel_width + kGap, panel_height, panel_width, scale);
   return out;
 }
 

@@ -20,8 +20,8 @@ struct HeatScale {
 };
 
 // The photo, and right of it the same photo in dim grey with every pixel that has evidence (score
-// not NaN) in its colour; below them the legend. rgb and score are [height, width, 3] and [height,
-// width].
+// not NaN) in its colour; below them the legend. Small photos are enlarged by a whole factor. rgb
+// and score are [height, width, 3] and [height, width].
 Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score, int height,
                      int width, const HeatScale& scale);
 

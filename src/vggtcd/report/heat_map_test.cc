@@ -27,14 +27,15 @@ TEST(RenderOverlay, KeepsThePhotoAndColoursOnlyPixelsWithEvidence) {
   const std::vector<uint8_t> rgb(12, 100);
   const std::vector<float> score = {0.0f, 2.0f, std::numeric_limits<float>::quiet_NaN(), 1.0f};
   const Image image = render_overlay(rgb, score, height, width, {1.0, 2.0});
-  ASSERT_EQ(image.width % 2, 0);
-  ASSERT_GT(image.height, height);
-  const int heat = image.width - width;
+  constexpr int kZoom = 180;  // 2 px become the smallest panel, 360 px
+  ASSERT_EQ(image.width, 2 * kZoom * width + 4);
+  ASSERT_GT(image.height, kZoom * height);
+  const int heat = image.width - kZoom * width;
   EXPECT_EQ(image.pixel(0, 0)[0], 100);
-  EXPECT_EQ(image.pixel(1, 1)[2], 100);
-  EXPECT_GT(image.pixel(heat, 0)[2], image.pixel(heat, 0)[0]);          // static: blue
-  EXPECT_GT(image.pixel(heat + 1, 0)[0], image.pixel(heat + 1, 0)[2]);  // at the bound: red
-  const uint8_t* unknown = image.pixel(heat, 1);
+  EXPECT_EQ(image.pixel(2 * kZoom - 1, 2 * kZoom - 1)[2], 100);
+  EXPECT_GT(image.pixel(heat, 0)[2], image.pixel(heat, 0)[0]);                  // static: blue
+  EXPECT_GT(image.pixel(heat + kZoom, 0)[0], image.pixel(heat + kZoom, 0)[2]);  // at the bound: red
+  const uint8_t* unknown = image.pixel(heat, kZoom);
   EXPECT_EQ(unknown[0], unknown[1]);
   EXPECT_EQ(unknown[1], unknown[2]);
 }
