@@ -54,7 +54,14 @@ function(vggtcd_test name)
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/src ${CMAKE_SOURCE_DIR})
-  target_compile_definitions(${name} PRIVATE VGGTCD_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  # Only where it is used: the compiler cache then serves the other tests from any checkout.
+  foreach(source ${arg_SOURCES})
+    file(STRINGS ${source} uses_source_dir REGEX VGGTCD_SOURCE_DIR LIMIT_COUNT 1)
+    if(uses_source_dir)
+      set_property(SOURCE ${source} APPEND PROPERTY
+                   COMPILE_DEFINITIONS VGGTCD_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+    endif()
+  endforeach()
   target_link_libraries(${name} PRIVATE ${arg_DEPS} GTest::gmock GTest::gtest_main)
   vggtcd_compile_options(${name})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
