@@ -56,7 +56,7 @@ function(vggtcd_test name)
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/src ${CMAKE_SOURCE_DIR})
   # Only where it is used: the compiler cache then serves the other tests from any checkout.
   foreach(source ${arg_SOURCES})
-    file(STRINGS ${source} uses_source_dir REGEX VGGTCD_SOURCE_DIR LIMIT_COUNT 1)
+    file(STRINGS ${source} uses_source_dir REGEX "VGGTCD_SOURCE_DIR|tests/support/.*\\.h" LIMIT_COUNT 1)
     if(uses_source_dir)
       set_property(SOURCE ${source} APPEND PROPERTY
                    COMPILE_DEFINITIONS VGGTCD_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
