@@ -14,28 +14,33 @@
 namespace vggtcd {
 namespace {
 
-// The confident points of an epoch in T2's frame. The confidences are not kept: at full size every
-// array here has 8.5 million entries.
-PointCloud confident_points(const Reconstruction& epoch, const Sim3& t2_from_epoch,
-                            const char* name) {
-  PointCloud cloud = unproject(epoch, confidence_threshold(epoch), t2_from_epoch);
-  if (cloud.size() == 0) {
+// The confident points of an epoch in T2, in pixel order. Which pixels they belong to is not kept:
+// it follows from the same walk over the photos, and at full size every array here has 8.5 million
+// entries.
+std::vector<Eigen::Vector3f> confident_points(const Reconstruction& epoch, float min_confidence,
+                                              const Sim3& t2_from_epoch, const char* name) {
+  std::vector<Eigen::Vector3f> positions =
+      unproject(epoch, min_confidence, t2_from_epoch).positions;
+  if (positions.empty()) {
     throw_error(ErrorCode::kDegenerate, "{} epoch: no point is left above the median confidence",
                 name);
   }
-  cloud.confidence = {};
-  return cloud;
+  return positions;
 }
 
-EpochChange scatter(const std::vector<float>& distance, const std::vector<uint32_t>& pixels,
-                    size_t num_pixels, float threshold) {
+EpochChange scatter(const std::vector<float>& distance, const Reconstruction& epoch,
+                    float min_confidence, float threshold) {
   EpochChange change;
-  change.score.assign(num_pixels, std::numeric_limits<float>::quiet_NaN());
-  change.points = static_cast<int64_t>(pixels.size());
-  for (size_t i = 0; i < pixels.size(); ++i) {
-    change.score[pixels[i]] = distance[i];
-    change.changed += distance[i] > threshold ? 1 : 0;
+  change.score.assign(epoch.num_pixels(), std::numeric_limits<float>::quiet_NaN());
+  size_t point = 0;
+  for (size_t pixel = 0; pixel < epoch.num_pixels(); ++pixel) {
+    if (!is_confident(epoch, pixel, min_confidence)) continue;
+    change.score[pixel] = distance[point];
+    change.changed += distance[point] > threshold ? 1 : 0;
+    ++point;
   }
+  check(point == distance.size(), "a distance for every confident pixel");
+  change.points = static_cast<int64_t>(point);
   return change;
 }
 
@@ -51,26 +56,32 @@ void ChangeOptions::validate() const {
 ChangeSet detect_changes(const Reconstruction& before, const Reconstruction& after,
                          const Sim3& t2_from_t1, const ChangeOptions& options) {
   options.validate();
-  PointCloud t1 = confident_points(before, t2_from_t1, "before");
-  PointCloud t2 = confident_points(after, {}, "after");
+  const float min_confidence_t1 = confidence_threshold(before);
+  const float min_confidence_t2 = confidence_threshold(after);
   ChangeSet result;
-  result.scene_extent_u = robust_extent(t2.positions);
-  result.threshold_u = options.threshold_fraction * result.scene_extent_u;
-  result.bound_u = options.bound_fraction * result.scene_extent_u;
-
-  const float bound = static_cast<float>(result.bound_u);
-  std::vector<float> distance_t1(t1.size()), distance_t2(t2.size());
+  std::vector<float> distance_t1, distance_t2;
   {
-    const NearestNeighborIndex index_t1(t1.positions);
-    t1.positions = {};
-    const NearestNeighborIndex index_t2(t2.positions);
-    t2.positions = {};
+    // One epoch after the other: an index holds its points, so its input goes before the next one
+    // comes.
+    const NearestNeighborIndex index_t1(
+        confident_points(before, min_confidence_t1, t2_from_t1, "before"));
+    std::vector<Eigen::Vector3f> positions_t2 =
+        confident_points(after, min_confidence_t2, {}, "after");
+    result.scene_extent_u = robust_extent(positions_t2);
+    result.threshold_u = options.threshold_fraction * result.scene_extent_u;
+    result.bound_u = options.bound_fraction * result.scene_extent_u;
+    const NearestNeighborIndex index_t2(positions_t2);
+    positions_t2 = {};
+
+    const float bound = static_cast<float>(result.bound_u);
+    distance_t1.resize(index_t1.size());
     index_t2.query(index_t1, bound, distance_t1);
+    distance_t2.resize(index_t2.size());
     index_t1.query(index_t2, bound, distance_t2);
   }
   const float threshold = static_cast<float>(result.threshold_u);
-  result.t1 = scatter(distance_t1, t1.pixels, before.num_pixels(), threshold);
-  result.t2 = scatter(distance_t2, t2.pixels, after.num_pixels(), threshold);
+  result.t1 = scatter(distance_t1, before, min_confidence_t1, threshold);
+  result.t2 = scatter(distance_t2, after, min_confidence_t2, threshold);
   return result;
 }
 

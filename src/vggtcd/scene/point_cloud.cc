@@ -40,7 +40,7 @@ PointCloud unproject(const Reconstruction& reconstruction, float min_confidence,
   check(reconstruction.num_pixels() <= std::numeric_limits<uint32_t>::max(),
         "unproject: more than 2^32 pixels");
   const auto keep = [&](size_t pixel) {
-    return reconstruction.depth[pixel] > 0 && reconstruction.confidence[pixel] > min_confidence;
+    return is_confident(reconstruction, pixel, min_confidence);
   };
   // Count per frame, so that every frame knows where its points go: same order on any thread count.
   std::vector<size_t> first(static_cast<size_t>(frames) + 1, 0);

@@ -39,6 +39,12 @@ struct PixelRays {
 Eigen::Vector3f unproject_pixel(const Reconstruction& reconstruction, uint32_t pixel,
                                 const Sim3& out_from_world = {});
 
+// Whether unproject() makes a point of this pixel: it has depth, and a confidence above the
+// threshold.
+inline bool is_confident(const Reconstruction& reconstruction, size_t pixel, float min_confidence) {
+  return reconstruction.depth[pixel] > 0 && reconstruction.confidence[pixel] > min_confidence;
+}
+
 // The points of all pixels with depth > 0 and confidence > min_confidence, in pixel order.
 PointCloud unproject(const Reconstruction& reconstruction, float min_confidence,
                      const Sim3& out_from_world = {});
