@@ -16,10 +16,12 @@
 namespace vggtcd {
 namespace {
 
+constexpr int64_t kLargestHeadDim = 128;
+
 // A head of one sequence is the unit of packing. Heads are packed in groups of about this many
 // tokens: enough work per parallel loop, little memory.
 constexpr int64_t kTokensPerGroup = 1 << 16;
-constexpr int64_t kKeysPerPackingTask = 512;
+constexpr int64_t kKeysPerPackingTask = 64;  // even: a pair of values is one task's
 
 template <typename T>
 struct Call {
@@ -74,41 +76,7 @@ void to_f32_words(const uint16_t* row, int64_t head_dim, float* words) {
 // Words (even[c], odd[c]) of two rows of values.
 void to_pair_words(const uint16_t* even, const uint16_t* odd, int64_t head_dim, float* words) {
   for (int64_t c = 0; c < head_dim; ++c) {
-    const uint32_t high = odd ? odd[c] : 0;
-    words[c] = std::bit_cast<float>(even[c] | high << 16);
-  }
-}
-
-// Keys and values [begin, end) of one head, begin and end multiples of kKeyPadding; k and v: its
-// first row.
-template <typename T>
-void pack_head(const Call<T>& call, const Layout& layout, const T* k, const T* v, int64_t begin,
-               int64_t end, float* keys, float* values) {
-  const int64_t tokens = call.shape.tokens, head_dim = call.shape.head_dim;
-  for (int64_t i = begin; i < end; ++i) {
-    const T* key = k + std::min(i, tokens - 1) * call.row_stride;
-    const T* value = i < tokens ? v + i * call.row_stride : nullptr;
-    float* key_words = keys + i * head_dim / layout.per_word;
-    float* value_words = values + i / layout.per_word * head_dim;
-    if (layout.per_word == 1) {
-      to_f32_words(key, head_dim, key_words);
-      if (value) {
-        to_f32_words(value, head_dim, value_words);
-      } else {
-        std::fill_n(value_words, head_dim, 0.0f);
-      }
-      continue;
-    }
-    if constexpr (sizeof(T) == 2) {
-      std::memcpy(key_words, key, static_cast<size_t>(head_dim) * sizeof(T));
-      if (i % 2 == 1) continue;  // done with the row before
-      if (value) {
-        const T* next = i + 1 < tokens ? value + call.row_stride : nullptr;
-        to_pair_words(value, next, head_dim, value_words);
-      } else {
-        std::fill_n(value_words, head_dim, 0.0f);
-      }
-    }
+    words[c] = std::bit_cast<float>(even[c] | static_cast<uint32_t>(odd[c]) << 16);
   }
 }
 
@@ -119,6 +87,55 @@ int64_t head_offset(const Call<T>& call, int64_t i, int64_t row_stride) {
          i % call.shape.heads * call.shape.head_dim;
 }
 
+// Row i of one head's keys and values, i < padded_tokens; k and v: the head's first row.
+template <typename T>
+void pack_row(const Call<T>& call, const Layout& layout, const T* k, const T* v, int64_t i,
+              float* keys, float* values) {
+  const int64_t tokens = call.shape.tokens, head_dim = call.shape.head_dim;
+  const T* key = k + std::min(i, tokens - 1) * call.row_stride;
+  const T* value = i < tokens ? v + i * call.row_stride : nullptr;
+  float* key_words = keys + i * head_dim / layout.per_word;
+  float* value_words = values + i / layout.per_word * head_dim;
+  if (layout.per_word == 1) {
+    to_f32_words(key, head_dim, key_words);
+    if (value) {
+      to_f32_words(value, head_dim, value_words);
+    } else {
+      std::fill_n(value_words, head_dim, 0.0f);
+    }
+    return;
+  }
+  if constexpr (sizeof(T) == 2) {
+    std::memcpy(key_words, key, static_cast<size_t>(head_dim) * sizeof(T));
+    if (i % 2 == 1) return;  // done with the row before
+    if (value) {
+      if (i + 1 < tokens) {
+        to_pair_words(value, value + call.row_stride, head_dim, value_words);
+      } else {
+        const uint16_t zeros[kLargestHeadDim] = {};
+        to_pair_words(value, zeros, head_dim, value_words);
+      }
+    } else {
+      std::fill_n(value_words, head_dim, 0.0f);
+    }
+  }
+}
+
+// Packs heads [first, first + count), row by row, because the heads of a row are neighbours.
+template <typename T>
+void pack(const Call<T>& call, const Layout& layout, int64_t first, int64_t count, float* keys,
+          float* values) {
+  parallel_for(layout.padded_tokens, kKeysPerPackingTask, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      for (int64_t h = 0; h < count; ++h) {
+        const int64_t offset = head_offset(call, first + h, call.row_stride);
+        pack_row(call, layout, call.k + offset, call.v + offset, i, keys + h * layout.block_words,
+                 values + h * layout.block_words);
+      }
+    }
+  });
+}
+
 template <typename T>
 void attention_vector(const Call<T>& call, AttentionWorkspace& workspace) {
   const AttentionShape& shape = call.shape;
@@ -126,19 +143,11 @@ void attention_vector(const Call<T>& call, AttentionWorkspace& workspace) {
   float* const keys = workspace.resize(static_cast<size_t>(layout.floats()));
   float* const values = keys + layout.group * layout.block_words;
   float* const scratch = values + layout.group * layout.block_words;
-  const int64_t packing_tasks = num_chunks(layout.padded_tokens, kKeysPerPackingTask);
   const int64_t tasks = num_chunks(shape.tokens, kQueriesPerTask);
   const int64_t heads = shape.sequences * shape.heads;
   for (int64_t first = 0; first < heads; first += layout.group) {
     const int64_t count = std::min(layout.group, heads - first);
-    parallel_for(count * packing_tasks, 1, [&](int64_t task, int64_t) {
-      const int64_t h = task / packing_tasks;
-      const int64_t begin = task % packing_tasks * kKeysPerPackingTask;
-      const int64_t offset = head_offset(call, first + h, call.row_stride);
-      pack_head(call, layout, call.k + offset, call.v + offset, begin,
-                std::min(layout.padded_tokens, begin + kKeysPerPackingTask),
-                keys + h * layout.block_words, values + h * layout.block_words);
-    });
+    pack(call, layout, first, count, keys, values);
     parallel_for_workers(count * tasks, 1, [&](int64_t task, int64_t, int worker) {
       const int64_t h = task / tasks, query = task % tasks * kQueriesPerTask;
       AttentionTask<T> block;

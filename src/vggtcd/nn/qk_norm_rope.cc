@@ -85,7 +85,7 @@ void qk_norm_rope(const QkNormRope& op, int64_t rows, T* qkv, int64_t row_stride
   const RowKernels* kernels = row_kernels();
   if (op.head_dim % kRopeMultiple != 0 || op.head_dim > kRopeLargestHead) kernels = nullptr;
   parallel_for(rows, 32, [&](int64_t begin, int64_t end) {
-    std::vector<float> scratch(static_cast<size_t>(op.head_dim));
+    std::vector<float> scratch(kernels ? 0 : static_cast<size_t>(op.head_dim));
     for (int64_t row = begin; row < end; ++row) {
       const RopePosition* position = op.rope ? op.positions + row % op.position_count : nullptr;
       T* q = qkv + row * row_stride;
