@@ -4,6 +4,9 @@
 
 #include <sys/mman.h>
 
+#include <algorithm>
+#include <charconv>
+
 #include "vggtcd/core/error.h"
 
 namespace vggtcd {
@@ -79,9 +82,18 @@ const std::vector<int64_t>& WeightScope::shape(std::string_view name) const {
   return entry->view.shape;
 }
 
-int WeightScope::count(std::string_view name, std::string_view leaf) const {
+int WeightScope::count(std::string_view name) const {
+  const std::string prefix = full_name(name) + ".";
   int depth = 0;
-  while (contains(fmt::format("{}.{}.{}", name, depth, leaf))) ++depth;
+  for (const auto& [tensor, entry] : store_->by_name_) {
+    if (!tensor.starts_with(prefix)) continue;
+    int layer = -1;
+    const char* const end = tensor.data() + tensor.size();
+    const auto number = std::from_chars(tensor.data() + prefix.size(), end, layer);
+    if (number.ec == std::errc() && number.ptr != end && *number.ptr == '.') {
+      depth = std::max(depth, layer + 1);
+    }
+  }
   return depth;
 }
 

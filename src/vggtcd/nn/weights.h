@@ -68,8 +68,9 @@ class WeightScope {
   bool contains(std::string_view name) const;
   // The shape as stored; Error{kWeights} if there is no such tensor.
   const std::vector<int64_t>& shape(std::string_view name) const;
-  // How many of name.0, name.1, ... hold a tensor called leaf: the depth of a stack of layers.
-  int count(std::string_view name, std::string_view leaf) const;
+  // The depth of a stack of layers: one more than the largest i of which there is a tensor
+  // name.i.SOMETHING, so that a layer with a hole counts, and is missed when it is taken.
+  int count(std::string_view name) const;
 
   // The tensor of exactly this name and shape and of a floating-point type, else Error{kWeights}.
   TensorView take(std::string_view name, std::span<const int64_t> shape) const;

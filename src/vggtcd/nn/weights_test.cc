@@ -98,11 +98,13 @@ TEST(WeightStore, ListsWhatNobodyTookButForThePrefixesGiven) {
   EXPECT_THAT(store.untaken(foreign), ElementsAre("c.w", "a.v"));
 }
 
-TEST(WeightScope, CountsLayersUpToTheFirstGap) {
+TEST(WeightScope, CountsLayersUpToTheLastOfWhichThereIsAnything) {
   const WeightStore store(
-      {tensor("blocks.0.n", {1}), tensor("blocks.1.n", {1}), tensor("blocks.3.n", {1})}, "file");
-  EXPECT_EQ(store.root().count("blocks", "n"), 2);
-  EXPECT_EQ(store.root().count("blocks", "m"), 0);
+      {tensor("head.blocks.0.n", {1}), tensor("head.blocks.3.m.n", {1}),
+       tensor("head.blocks.x.n", {1}), tensor("head.blocks.9", {1}), tensor("blocks.20.n", {1})},
+      "file");
+  EXPECT_EQ(store.root().at("head").count("blocks"), 4);
+  EXPECT_EQ(store.root().at("head").count("trunk"), 0);
 }
 
 }  // namespace

@@ -37,13 +37,11 @@ CameraHead::CameraHead(const WeightScope& scope, const VggtConfig& config, DType
       embed_pose_(scope.at("embed_pose"), 9, channels_, {}),
       modulation_(scope.at("poseLN_modulation.1"), channels_, 3 * channels_, {}),
       trunk_(make_blocks(
-          scope.at("trunk"), scope.count("trunk", "norm1.weight"),
+          scope.at("trunk"), config.camera_depth,
           {.channels = channels_, .heads = config.camera_heads, .eps = kEps, .compute = compute})),
       branch_fc1_(scope.at("pose_branch.fc1"), channels_, channels_ / 2,
                   {.activation = Activation::kGelu}),
-      branch_fc2_(scope.at("pose_branch.fc2"), channels_ / 2, 9, {.accumulate = true}) {
-  if (trunk_.empty()) scope.shape("trunk.0.norm1.weight");  // throws
-}
+      branch_fc2_(scope.at("pose_branch.fc2"), channels_ / 2, 9, {.accumulate = true}) {}
 
 // shift, scale, gate = poseLN_modulation(embedded).chunk(3)
 // x = gate * (adaln_norm(pose_tokens) * (1 + scale) + shift) + pose_tokens

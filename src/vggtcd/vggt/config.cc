@@ -48,18 +48,24 @@ void read_shapes(const WeightStore& store, VggtConfig& config) {
   }
   config.vit_register_tokens = shape_of(vit, "register_tokens", 3, source)[1];
   config.register_tokens = shape_of(aggregator, "register_token", 4, source)[2];
-  config.vit_depth = vit.count("blocks", "norm1.weight");
-  config.depth = aggregator.count("frame_blocks", "norm1.weight");
+  config.vit_depth = vit.count("blocks");
+  config.depth = aggregator.count("frame_blocks");
   config.mlp_hidden = shape_of(vit, "blocks.0.mlp.fc1.bias", 1, source)[0];
   const WeightScope camera = store.root().at("camera_head");
-  config.camera_depth = camera.count("trunk", "norm1.weight");
+  config.camera_depth = camera.count("trunk");
   config.camera_hidden = shape_of(camera, "trunk.0.mlp.fc1.bias", 1, source)[0];
   const WeightScope dense = store.root().at(
       store.root().contains("depth_head.norm.weight") ? "depth_head" : "point_head");
   if (dense.contains("norm.weight")) read_dense_shapes(dense, source, config);
 }
 
-void read_metadata(const std::string& text, const std::string& source, VggtConfig& config) {
+// The depths that a checkpoint must have: a shorter stack is a damaged file, not a smaller network.
+struct Depths {
+  int depth = 24, vit_depth = 24, camera_depth = 4;  // VGGT-1B
+};
+
+void read_metadata(const std::string& text, const std::string& source, VggtConfig& config,
+                   Depths& expected) {
   if (text.empty()) return;
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) {
@@ -75,6 +81,9 @@ void read_metadata(const std::string& text, const std::string& source, VggtConfi
                   key);
     }
   };
+  read("depth", expected.depth);
+  read("vit_depth", expected.vit_depth);
+  read("camera_trunk_depth", expected.camera_depth);
   read("num_heads", config.heads);
   read("vit_num_heads", config.vit_heads);
   read("camera_num_heads", config.camera_heads);
@@ -95,15 +104,28 @@ void check_heads(const std::string& source, const char* what, int64_t channels, 
   }
 }
 
+void check_depth(const std::string& source, const char* stack, int expected, int found) {
+  if (expected == found) return;
+  throw_error(ErrorCode::kWeights,
+              "{}: expected {} layers in {}, found {}; the file is not a complete checkpoint of "
+              "VGGT-1B, or of the network that its metadata key \"config\" describes",
+              source, expected, stack, found);
+}
+
 }  // namespace
 
 VggtConfig read_config(const WeightStore& store, const std::string& config_json) {
   VggtConfig config;
+  Depths expected;
   read_shapes(store, config);
-  read_metadata(config_json, store.source(), config);
+  read_metadata(config_json, store.source(), config, expected);
   check_heads(store.source(), "num_heads", config.channels, config.heads);
   check_heads(store.source(), "vit_num_heads", config.channels, config.vit_heads);
   check_heads(store.source(), "camera_num_heads", 2 * config.channels, config.camera_heads);
+  check_depth(store.source(), "aggregator.frame_blocks", expected.depth, config.depth);
+  check_depth(store.source(), "aggregator.patch_embed.blocks", expected.vit_depth,
+              config.vit_depth);
+  check_depth(store.source(), "camera_head.trunk", expected.camera_depth, config.camera_depth);
   int previous = -1;
   for (const int layer : config.dpt_layers) {
     if (layer <= previous || layer >= config.depth) {

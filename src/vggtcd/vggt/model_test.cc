@@ -120,10 +120,11 @@ TEST(Vggt, NeedsEveryTensorAndListsTheSuperfluous) {
   const Vggt model = Vggt::from_tensors(more, weights.config_json(), "recipe",
                                         {.precision = Precision::kF32, .point_head = true});
   EXPECT_THAT(model.superfluous(), ::testing::ElementsAre("aggregator.frame_blocks.0.attn.rotary"));
-  // Every single tensor, but the one that only training needs, is missed by name when it is absent.
+  // A missing tensor is missed: a sample of all, and the first of every layer of a stack.
   for (size_t i = 0; i < tensors.size(); ++i) {
     const std::string name = tensors[i].name;
-    if (name.ends_with("mask_token")) continue;
+    if (name.ends_with("mask_token")) continue;  // only training needs it
+    if (i % 11 != 0 && !name.ends_with("norm1.weight")) continue;
     std::vector<TensorView> fewer = tensors;
     fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(i));
     try {
@@ -133,6 +134,17 @@ TEST(Vggt, NeedsEveryTensorAndListsTheSuperfluous) {
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::kWeights) << error.what();
     }
+  }
+}
+
+TEST(Vggt, ACheckpointThatEndsEarlyIsNotASmallerNetwork) {
+  const RecipeWeights weights(testing::NetworkSizes::tiny(), 1);
+  for (const char* last : {"aggregator.patch_embed.blocks.1.", "camera_head.trunk.3."}) {
+    std::vector<TensorView> fewer = weights.tensors();
+    std::erase_if(fewer, [&](const TensorView& tensor) { return tensor.name.starts_with(last); });
+    EXPECT_THAT(error_of([&] { Vggt::from_tensors(fewer, weights.config_json(), "recipe", {}); },
+                         ErrorCode::kWeights),
+                HasSubstr("layers in"));
   }
 }
 
