@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The weight recipe: the tensor list of a VGGT by its sizes, and the hash that fills it.
+// The weight recipe: the hash that fills the tensors of a VGGT.
 #include "tests/support/weight_recipe.h"
 
 #include <fmt/format.h>
@@ -14,100 +14,10 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/io/safetensors.h"
 
 namespace vggtcd::testing {
 namespace {
-
-constexpr int64_t kPatchSize = 14, kHeadDim = 64, kRegisters = 4, kMlpRatio = 4, kPoseDim = 9;
-
-// Collects specs; the member functions follow the modules of the reference implementation.
-class SpecList {
- public:
-  std::vector<TensorSpec> specs;
-
-  void tensor(const std::string& name, std::vector<int64_t> shape) {
-    specs.push_back({name, std::move(shape)});
-  }
-  void weight_and_bias(const std::string& name, std::vector<int64_t> shape) {
-    const int64_t outputs = shape[0];
-    tensor(name + ".weight", std::move(shape));
-    tensor(name + ".bias", {outputs});
-  }
-  void norm(const std::string& name, int64_t channels) { weight_and_bias(name, {channels}); }
-
-  void block(const std::string& name, int64_t channels, bool qk_norm) {
-    norm(name + ".norm1", channels);
-    weight_and_bias(name + ".attn.qkv", {3 * channels, channels});
-    if (qk_norm) {
-      norm(name + ".attn.q_norm", kHeadDim);
-      norm(name + ".attn.k_norm", kHeadDim);
-    }
-    weight_and_bias(name + ".attn.proj", {channels, channels});
-    tensor(name + ".ls1.gamma", {channels});
-    norm(name + ".norm2", channels);
-    weight_and_bias(name + ".mlp.fc1", {kMlpRatio * channels, channels});
-    weight_and_bias(name + ".mlp.fc2", {channels, kMlpRatio * channels});
-    tensor(name + ".ls2.gamma", {channels});
-  }
-
-  void aggregator(const NetworkSizes& sizes) {
-    const int64_t channels = sizes.embed_dim, grid = sizes.image_size / kPatchSize;
-    tensor("aggregator.camera_token", {1, 2, 1, channels});
-    tensor("aggregator.register_token", {1, 2, kRegisters, channels});
-    const std::string vit = "aggregator.patch_embed";
-    tensor(vit + ".cls_token", {1, 1, channels});
-    tensor(vit + ".pos_embed", {1, 1 + grid * grid, channels});
-    tensor(vit + ".register_tokens", {1, kRegisters, channels});
-    tensor(vit + ".mask_token", {1, channels});
-    weight_and_bias(vit + ".patch_embed.proj", {channels, 3, kPatchSize, kPatchSize});
-    for (int64_t i = 0; i < sizes.vit_depth; ++i)
-      block(fmt::format("{}.blocks.{}", vit, i), channels, false);
-    norm(vit + ".norm", channels);
-    for (const char* kind : {"frame", "global"}) {
-      for (int64_t i = 0; i < sizes.depth; ++i)
-        block(fmt::format("aggregator.{}_blocks.{}", kind, i), channels, true);
-    }
-  }
-
-  void camera_head(const NetworkSizes& sizes) {
-    const int64_t channels = 2 * sizes.embed_dim;
-    tensor("camera_head.empty_pose_tokens", {1, 1, kPoseDim});
-    for (int i = 0; i < 4; ++i) block(fmt::format("camera_head.trunk.{}", i), channels, false);
-    norm("camera_head.token_norm", channels);
-    norm("camera_head.trunk_norm", channels);
-    weight_and_bias("camera_head.embed_pose", {channels, kPoseDim});
-    weight_and_bias("camera_head.poseLN_modulation.1", {3 * channels, channels});
-    weight_and_bias("camera_head.pose_branch.fc1", {channels / 2, channels});
-    weight_and_bias("camera_head.pose_branch.fc2", {kPoseDim, channels / 2});
-  }
-
-  void dpt_head(const std::string& head, const NetworkSizes& sizes, int64_t outputs) {
-    const int64_t features = sizes.dpt_features;
-    const std::array<int64_t, 4>& channels = sizes.dpt_out_channels;
-    norm(head + ".norm", 2 * sizes.embed_dim);
-    for (size_t i = 0; i < 4; ++i)
-      weight_and_bias(fmt::format("{}.projects.{}", head, i),
-                      {channels[i], 2 * sizes.embed_dim, 1, 1});
-    weight_and_bias(head + ".resize_layers.0", {channels[0], channels[0], 4, 4});
-    weight_and_bias(head + ".resize_layers.1", {channels[1], channels[1], 2, 2});
-    weight_and_bias(head + ".resize_layers.3", {channels[3], channels[3], 3, 3});
-    const std::string scratch = head + ".scratch";
-    for (size_t i = 0; i < 4; ++i)
-      tensor(fmt::format("{}.layer{}_rn.weight", scratch, i + 1), {features, channels[i], 3, 3});
-    for (int i = 1; i <= 4; ++i) {
-      const std::string net = fmt::format("{}.refinenet{}", scratch, i);
-      weight_and_bias(net + ".out_conv", {features, features, 1, 1});
-      for (int unit = i == 4 ? 2 : 1; unit <= 2; ++unit) {
-        for (int conv = 1; conv <= 2; ++conv)
-          weight_and_bias(fmt::format("{}.resConfUnit{}.conv{}", net, unit, conv),
-                          {features, features, 3, 3});
-      }
-    }
-    weight_and_bias(scratch + ".output_conv1", {features / 2, features, 3, 3});
-    weight_and_bias(scratch + ".output_conv2.0", {32, features / 2, 3, 3});
-    weight_and_bias(scratch + ".output_conv2.2", {outputs, 32, 1, 1});
-  }
-};
 
 struct Range {
   double offset, scale;
@@ -122,7 +32,7 @@ Range range_of(const TensorSpec& spec, int64_t index) {
   const std::string_view leaf = std::string_view(name).substr(name.rfind('.') + 1);
   const bool weight = leaf == "weight";
   if (name == "camera_head.pose_branch.fc2.bias") {
-    constexpr double kOffsets[kPoseDim] = {0, 0, 0, 0, 0, 0, 0.25, 0.25, 0.30};
+    constexpr double kOffsets[9] = {0, 0, 0, 0, 0, 0, 0.25, 0.25, 0.30};
     return rounded(kOffsets[index], 0.02);
   }
   if (leaf == "gamma") return rounded(0.3, 0.1);
@@ -154,28 +64,20 @@ int64_t numel(const std::vector<int64_t>& shape) {
 }  // namespace
 
 NetworkSizes NetworkSizes::tiny() {
-  return {.image_size = 70,
-          .embed_dim = 128,
-          .num_heads = 2,
-          .depth = 4,
-          .vit_depth = 2,
-          .camera_num_heads = 2,
-          .dpt_features = 64,
-          .dpt_out_channels = {64, 64, 128, 128},
-          .dpt_layers = {0, 1, 2, 3}};
+  NetworkSizes sizes;
+  sizes.image_size = 70;
+  sizes.embed_dim = 128;
+  sizes.depth = 4;
+  sizes.vit_depth = 2;
+  sizes.dpt_features = 64;
+  sizes.dpt_out_channels = {64, 64, 128, 128};
+  sizes.num_heads = 2;
+  sizes.camera_num_heads = 2;
+  sizes.dpt_layers = {0, 1, 2, 3};
+  return sizes;
 }
 
-NetworkSizes NetworkSizes::vggt_1b() {
-  return {.image_size = 518,
-          .embed_dim = 1024,
-          .num_heads = 16,
-          .depth = 24,
-          .vit_depth = 24,
-          .camera_num_heads = 16,
-          .dpt_features = 256,
-          .dpt_out_channels = {256, 512, 1024, 1024},
-          .dpt_layers = {4, 11, 17, 23}};
-}
+NetworkSizes NetworkSizes::vggt_1b() { return {}; }
 
 std::string network_config_json(const NetworkSizes& s) {
   return fmt::format(
@@ -188,22 +90,6 @@ std::string network_config_json(const NetworkSizes& s) {
       s.image_size, s.embed_dim, s.depth, s.num_heads, s.vit_depth, s.num_heads, 2 * s.embed_dim,
       s.camera_num_heads, s.dpt_features, fmt::join(s.dpt_out_channels, ", "),
       fmt::join(s.dpt_layers, ", "));
-}
-
-std::vector<TensorSpec> tensor_specs(const NetworkSizes& sizes,
-                                     std::span<const std::string_view> modules) {
-  for (const std::string_view module : modules) {
-    check(std::ranges::find(kAllModules, module) != kAllModules.end(), "tensor_specs: a module");
-  }
-  const auto wanted = [&](std::string_view module) {
-    return std::ranges::find(modules, module) != modules.end();
-  };
-  SpecList list;
-  if (wanted("aggregator")) list.aggregator(sizes);
-  if (wanted("camera_head")) list.camera_head(sizes);
-  if (wanted("point_head")) list.dpt_head("point_head", sizes, 4);
-  if (wanted("depth_head")) list.dpt_head("depth_head", sizes, 2);
-  return std::move(list.specs);
 }
 
 uint64_t splitmix64(uint64_t x) {
@@ -242,7 +128,7 @@ RecipeWeights::RecipeWeights(const NetworkSizes& sizes, uint64_t seed,
                              std::span<const std::string_view> modules)
     : config_json_(network_config_json(sizes)) {
   constexpr int64_t kAlignment = 64 / sizeof(float);
-  std::vector<TensorSpec> specs = tensor_specs(sizes, modules);
+  std::vector<TensorSpec> specs = network_tensors(sizes, modules);
   int64_t size = 0;
   for (const TensorSpec& spec : specs)
     size += (numel(spec.shape) + kAlignment - 1) / kAlignment * kAlignment;
@@ -256,6 +142,17 @@ RecipeWeights::RecipeWeights(const NetworkSizes& sizes, uint64_t seed,
                         std::as_bytes(std::span(values, static_cast<size_t>(count)))});
     values += (count + kAlignment - 1) / kAlignment * kAlignment;
   }
+}
+
+void write_recipe_weights(const NetworkSizes& sizes, uint64_t seed,
+                          const std::filesystem::path& path) {
+  const std::vector<TensorSpec> specs = network_tensors(sizes, kNetworkModules);
+  std::vector<TensorInfo> infos;
+  for (const TensorSpec& spec : specs) infos.push_back({spec.name, DType::kF32, spec.shape});
+  write_safetensors(path, infos, {{"config", network_config_json(sizes)}},
+                    [&](size_t i, std::span<std::byte> data) {
+                      fill_by_recipe(specs[i], seed, reinterpret_cast<float*>(data.data()));
+                    });
 }
 
 }  // namespace vggtcd::testing

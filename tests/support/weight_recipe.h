@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -13,20 +14,15 @@
 #include <vector>
 
 #include "vggtcd/core/tensor_view.h"
+#include "vggtcd/vggt/network_tensors.h"
 
 namespace vggtcd::testing {
 
-// What decides the names and shapes of a VGGT. Head width is 64, patches are 14 pixels.
-struct NetworkSizes {
-  int64_t image_size;  // px; the position embedding covers (image_size / 14)^2 patches
-  int64_t embed_dim;
-  int64_t num_heads;
-  int64_t depth;      // frame blocks, and as many global blocks
-  int64_t vit_depth;  // blocks of the patch embedder
-  int64_t camera_num_heads;
-  int64_t dpt_features;
-  std::array<int64_t, 4> dpt_out_channels;
-  std::array<int64_t, 4> dpt_layers;
+// What decides names and shapes, and what shapes cannot tell.
+struct NetworkSizes : vggtcd::NetworkSizes {
+  int64_t num_heads = 16;
+  int64_t camera_num_heads = 16;
+  std::array<int64_t, 4> dpt_layers = {4, 11, 17, 23};
 
   static NetworkSizes tiny();     // golden cases: seed 1
   static NetworkSizes vggt_1b();  // golden cases: seed 7
@@ -35,17 +31,8 @@ struct NetworkSizes {
 // The hyper-parameters as the JSON text that weight files carry under the metadata key "config".
 std::string network_config_json(const NetworkSizes& sizes);
 
-struct TensorSpec {
-  std::string name;
-  std::vector<int64_t> shape;
-};
-
-inline constexpr std::array<std::string_view, 4> kAllModules = {"aggregator", "camera_head",
-                                                                "point_head", "depth_head"};
-
-// Every tensor of these modules (a subset of kAllModules), in state_dict order.
-std::vector<TensorSpec> tensor_specs(const NetworkSizes& sizes,
-                                     std::span<const std::string_view> modules = kAllModules);
+using TensorSpec = NamedShape;
+inline constexpr std::array<std::string_view, 4> kAllModules = kNetworkModules;
 
 // The recipe. `index` counts in C order.
 //   splitmix64(x): z = x + 0x9E3779B97F4A7C15; z = (z ^ z>>30) * 0xBF58476D1CE4E5B9;
@@ -73,5 +60,9 @@ class RecipeWeights {
   std::vector<TensorView> tensors_;
   std::string config_json_;
 };
+
+// Writes all modules as safetensors with the metadata key "config", one tensor at a time.
+void write_recipe_weights(const NetworkSizes& sizes, uint64_t seed,
+                          const std::filesystem::path& path);
 
 }  // namespace vggtcd::testing

@@ -60,7 +60,7 @@ void expect_names(const NetworkSizes& sizes, const nlohmann::json& groups) {
     uLong crc = 0;
   };
   std::map<std::string, Group> found;
-  for (const TensorSpec& spec : tensor_specs(sizes)) {
+  for (const TensorSpec& spec : network_tensors(sizes, kNetworkModules)) {
     const size_t first = spec.name.find('.');
     const bool aggregator = spec.name.starts_with("aggregator.");
     Group& group = found[spec.name.substr(0, aggregator ? spec.name.find('.', first + 1) : first)];

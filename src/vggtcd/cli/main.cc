@@ -29,6 +29,8 @@ int run(int argc, char** argv) {
       "'vggt-cd COMMAND --help' explains a command. Exit statuses: docs/formats.md.");
   add_detect(program);
   add_register(program);
+  add_reconstruct(program);
+  add_weights(program);
   add_synthesize(program);
   try {
     program.app.parse(argc, argv);

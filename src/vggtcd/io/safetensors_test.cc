@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 
+#include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
 
@@ -179,15 +180,7 @@ TEST(Safetensors, HostileNamesDoNotBreakTheLine) {
 
 class SafetensorsWriter : public ::testing::Test {
  protected:
-  SafetensorsWriter() : directory_(fs::path(::testing::TempDir()) / "safetensors_test") {
-    fs::remove_all(directory_);
-    fs::create_directory(directory_);
-  }
-  ~SafetensorsWriter() override { fs::remove_all(directory_); }
-  size_t files() const {
-    return static_cast<size_t>(std::distance(fs::directory_iterator(directory_), {}));
-  }
-  fs::path directory_;
+  const TemporaryDirectory directory_;
 };
 
 TEST_F(SafetensorsWriter, WhatIsWrittenIsReadAgain) {
@@ -219,7 +212,7 @@ TEST_F(SafetensorsWriter, FailureLeavesNothingBehind) {
     throw_error(ErrorCode::kWeights, "no values");
   };
   EXPECT_THROW(write_safetensors(directory_ / "out", infos, {}, fail), Error);
-  EXPECT_EQ(files(), 0u);
+  EXPECT_EQ(directory_.num_files(), 0u);
 }
 
 TEST_F(SafetensorsWriter, InterruptLeavesNothingBehind) {
@@ -227,12 +220,12 @@ TEST_F(SafetensorsWriter, InterruptLeavesNothingBehind) {
   const auto interrupt = [](size_t, std::span<std::byte>) { request_interrupt(); };
   EXPECT_THROW(write_safetensors(directory_ / "out", infos, {}, interrupt), Error);
   clear_interrupt();
-  EXPECT_EQ(files(), 0u);
+  EXPECT_EQ(directory_.num_files(), 0u);
 }
 
 TEST_F(SafetensorsWriter, UnwritablePathIsNamed) {
   try {
-    write_safetensors(directory_ / "no" / "out", {}, {}, {});
+    write_safetensors(directory_ / "no/out", {}, {}, {});
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kOutput);

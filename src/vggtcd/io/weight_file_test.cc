@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 
 namespace vggtcd {
@@ -17,7 +18,8 @@ namespace fs = std::filesystem;
 
 // The error for a file of this content, which must be one line that names the file.
 std::string error_of(const std::string& content) {
-  const std::string path = ::testing::TempDir() + "weight_file_test.bin";
+  const TemporaryDirectory directory;
+  const std::string path = directory / "weights.bin";
   std::ofstream(path, std::ios::binary) << content;
   std::string what;
   try {
@@ -26,7 +28,6 @@ std::string error_of(const std::string& content) {
     EXPECT_EQ(error.code(), ErrorCode::kWeights);
     what = error.what();
   }
-  fs::remove(path);
   EXPECT_TRUE(what.starts_with(path + ": ")) << what;
   EXPECT_EQ(what.find('\n'), std::string::npos) << what;
   return what;
@@ -57,11 +58,10 @@ TEST(WeightFile, FailedDownloadsAreCalledWhatTheyAre) {
 TEST(WeightFile, WhatCannotBeReadIsNamed) {
   EXPECT_EQ(code_of("/no/such/file"), ErrorCode::kInput);
   EXPECT_EQ(code_of(::testing::TempDir()), ErrorCode::kInput);
-  const std::string pipe = ::testing::TempDir() + "weight_file_test.pipe";
-  fs::remove(pipe);
+  const TemporaryDirectory directory;
+  const std::string pipe = directory / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_EQ(code_of(pipe), ErrorCode::kInput);  // and does not wait for a writer
-  fs::remove(pipe);
 }
 
 }  // namespace

@@ -12,15 +12,6 @@
 namespace vggtcd {
 namespace {
 
-Precision resolve(Precision asked) {
-  if (asked == Precision::kAuto) return bf16_is_fast() ? Precision::kBf16 : Precision::kF32;
-  if (asked == Precision::kBf16 && !bf16_is_fast()) {
-    throw_error(ErrorCode::kUsage,
-                "precision: bf16 needs a processor with AVX512_BF16, found none; use f32");
-  }
-  return asked;
-}
-
 DType aggregator_type(Precision precision) {
   return precision == Precision::kBf16 ? DType::kBF16 : DType::kF32;
 }
@@ -102,9 +93,18 @@ std::span<const EnumName<Precision>> enum_names(Precision) {
   return names;
 }
 
+Precision resolve_precision(Precision asked) {
+  if (asked == Precision::kAuto) return bf16_is_fast() ? Precision::kBf16 : Precision::kF32;
+  if (asked == Precision::kBf16 && !bf16_is_fast()) {
+    throw_error(ErrorCode::kUsage,
+                "precision: bf16 needs a processor with AVX512_BF16, found none; use f32");
+  }
+  return asked;
+}
+
 Vggt::Vggt(const WeightStore& store, const std::string& config_json, const VggtOptions& options)
     : config_(read_config(store, config_json)),
-      precision_(resolve(options.precision)),
+      precision_(resolve_precision(options.precision)),
       aggregator_(store.root().at("aggregator"), config_, aggregator_type(precision_)),
       camera_head_(store.root().at("camera_head"), config_, kCameraType) {
   std::vector<std::string_view> ignored(kForeignModules.begin(), kForeignModules.end());

@@ -28,6 +28,9 @@ enum class Precision {
 };
 std::span<const EnumName<Precision>> enum_names(Precision);
 
+// What is computed with: kF32 or kBf16. Error{kUsage} for kBf16 on a processor that has none.
+Precision resolve_precision(Precision asked);
+
 struct VggtOptions {
   Precision precision = Precision::kAuto;
   bool depth_head = true;   // depth and its confidence; the camera head is always there

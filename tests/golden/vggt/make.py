@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes the cases of this folder from complete outputs of the reference PyTorch network.
 
-Usage: make.py FOLDER, with FOLDER/tiny/case_*.npz and FOLDER/full/case_*.npz: one array per stage, in
+Usage: make.py FOLDER, with FOLDER/tiny/case_*.npz (case_a_half_weights.npz without its images) and FOLDER/full/case_*.npz: one array per stage, in
 f32. Inputs and small results are kept whole; of every other array a sample: elements 0, step, 2*step, ..
 in C order, with a step that is odd and has no factor in common with the array's dimensions, so that every
 frame, token and channel has its share. SAMPLE__name is the sample, SHAPE__name the shape of the whole and
@@ -26,8 +26,11 @@ def coprime_step(shape, wanted):
     return step
 
 
-def reduce_case(source, target, wanted):
+def reduce_case(source, target, wanted, images_from=None):
     out = {}
+    if images_from is not None:
+        with np.load(images_from) as data:
+            out["images"] = data["images"]
     with np.load(source) as data:
         for key in data.files:
             value = data[key]
@@ -49,6 +52,9 @@ def main():
     source, here = pathlib.Path(sys.argv[1]), pathlib.Path(__file__).parent
     for path in sorted((source / "tiny").glob("case_?_s*.npz")):
         reduce_case(path, here / f"tiny_{path.name}", 3000)
+    tiny = source / "tiny"
+    reduce_case(tiny / "case_a_half_weights.npz", here / "tiny_case_a_half_weights.npz", 3000,
+                tiny / "case_a_s3_70x70.npz")
     for path in sorted((source / "full").glob("case_*.npz")):
         reduce_case(path, here / f"full_{path.name}", 6000)
 

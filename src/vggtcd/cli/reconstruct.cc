@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// vggt-cd reconstruct: photos of one place -> cameras and depth, as a prediction file.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "vggtcd/cli/command.h"
+#include "vggtcd/core/timer.h"
+#include "vggtcd/io/output_file.h"
+#include "vggtcd/io/photo_list.h"
+#include "vggtcd/vggt/batch_file.h"
+#include "vggtcd/vggt/checkpoint.h"
+#include "vggtcd/vggt/memory_plan.h"
+#include "vggtcd/vggt/model.h"
+#include "vggtcd/vggt/preprocess.h"
+
+namespace vggtcd::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::vector<fs::path> photos;
+  fs::path output, weights;
+  PreprocessOptions preprocess;
+  VggtOptions network;
+};
+
+ImageBatch load_input(const Arguments& arguments, ProgressSink& progress) {
+  const bool npz = arguments.photos.size() == 1 && arguments.photos[0].extension() == ".npz";
+  if (npz) return read_image_batch(arguments.photos[0]);
+  return load_photos(list_photos(arguments.photos, progress), arguments.preprocess, progress);
+}
+
+void reconstruct(const Arguments& arguments, ProgressSink& progress) {
+  // What can be known to fail fails now, not after the network has run for an hour.
+  { const OutputFile probe(arguments.output); }
+  const VggtConfig config = read_checkpoint_config(arguments.weights);
+  const Precision precision = resolve_precision(arguments.network.precision);
+  const ImageBatch images = load_input(arguments, progress);
+  const VggtRun run{.frames = images.frames,
+                    .height = images.height,
+                    .width = images.width,
+                    .bf16 = precision == Precision::kBf16,
+                    .depth_head = arguments.network.depth_head,
+                    .point_head = arguments.network.point_head};
+  const MemoryPlan plan = plan_memory(config, run, available_memory_bytes());
+  throw_unless_fits(plan);
+  progress.notice(plan.summary());
+
+  const Vggt network = [&] {
+    const ProgressStage stage(progress, "weights");
+    return Vggt::load(arguments.weights, arguments.network);
+  }();
+  const Prediction prediction = network.reconstruct(images, progress);
+  {
+    const ProgressStage stage(progress, "write");
+    write_prediction(arguments.output, images, prediction);
+  }
+  fmt::print("{}: {} frames of {} x {} px\n", arguments.output.string(), images.frames,
+             images.width, images.height);
+}
+
+}  // namespace
+
+void add_reconstruct(Program& program) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      add_command(program, program.app, "reconstruct",
+                  "Cameras, depth and confidence from photos of one place.",
+                  [arguments](ProgressSink& progress) { reconstruct(*arguments, progress); });
+  command
+      ->add_option("PHOTOS", arguments->photos,
+                   "Folders and photos, in order; or one .npz with images (S,3,H,W) in [0,1].")
+      ->required();
+  command->add_option("-o,--output", arguments->output, "The prediction file to write (.npz).")
+      ->required();
+  command
+      ->add_option("--weights", arguments->weights,
+                   "VGGT's weights: .safetensors or .pt, as downloaded or converted.")
+      ->required();
+  add_fields(command, arguments->network, "Network");
+  add_fields(command, arguments->preprocess, "Photos");
+  command->footer(
+      "Example:\n"
+      "  vggt-cd reconstruct before/ -o t1.npz --weights model.safetensors\n\n"
+      "The first photo's camera is the origin; the scale is the network's own. The file has "
+      "VGGT's\n"
+      "keys: extrinsic (camera-from-world, OpenCV axes), intrinsic, depth, depth_conf, pose_enc,\n"
+      "images; with --point-head also world_points and world_points_conf. Memory grows with the\n"
+      "number of photos, time with its square; the need is told before the work starts.");
+}
+
+}  // namespace vggtcd::cli
