@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hilbert order by a table of the curve's 24 orientations and a parallel radix sort.
+// Hilbert order by a table of the curve's 24 orientations and a radix sort.
 #include "vggtcd/geometry/hilbert_order.h"
 
 #include <algorithm>
@@ -7,8 +7,10 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numeric>
 #include <utility>
+#include <vector>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
@@ -22,8 +24,8 @@ constexpr float kCellsPerAxis = 1 << kBitsPerAxis;
 // One step down the curve: in this orientation, octant 0..7 is the digit-th one visited, and the
 // curve inside it has orientation next.
 struct Step {
-  uint8_t digit;
-  uint8_t next;  // premultiplied by 8
+  uint32_t digit;
+  uint32_t next;
 };
 
 constexpr uint32_t rotate_left(uint32_t bits, uint32_t by) {
@@ -31,27 +33,53 @@ constexpr uint32_t rotate_left(uint32_t bits, uint32_t by) {
 }
 
 // Orientation = 3 * entry corner + direction; Hamilton's e, d, T and the Gray code g.
-constexpr std::array<Step, 24 * 8> make_steps() {
-  std::array<Step, 24 * 8> steps{};
+constexpr Step step(uint32_t orientation, uint32_t octant) {
+  const uint32_t entry = orientation / 3, direction = orientation % 3;
+  const uint32_t turn = (direction + 1) % 3;
+  const uint32_t gray = rotate_left(octant ^ entry, (3 - turn) % 3);  // T: rotate right
+  const uint32_t digit = gray ^ (gray >> 1) ^ (gray >> 2);            // inverse Gray code
+  const uint32_t even = digit == 0 ? 0 : (digit - 1) / 2 * 2;
+  const uint32_t odd = digit == 0 ? 0 : (digit - 1) | 1u;
+  const uint32_t direction_of_digit = static_cast<uint32_t>(std::countr_one(odd)) % 3;
+  const uint32_t next_entry = entry ^ rotate_left(even ^ (even >> 1), turn);
+  return {digit, 3 * next_entry + (direction + direction_of_digit + 1) % 3};
+}
+
+// Two steps at once: entry 64 * orientation + 8 * octant + octant inside it holds both digits below
+// and 64 * next orientation above bit 6.
+constexpr std::array<uint32_t, 24 * 64> make_double_steps() {
+  std::array<uint32_t, 24 * 64> steps{};
   for (uint32_t orientation = 0; orientation < 24; ++orientation) {
-    const uint32_t entry = orientation / 3, direction = orientation % 3;
-    const uint32_t turn = (direction + 1) % 3;
-    for (uint32_t octant = 0; octant < 8; ++octant) {
-      const uint32_t gray = rotate_left(octant ^ entry, (3 - turn) % 3);  // T: rotate right
-      const uint32_t digit = gray ^ (gray >> 1) ^ (gray >> 2);            // inverse Gray code
-      const uint32_t even = digit == 0 ? 0 : (digit - 1) / 2 * 2;
-      const uint32_t entry_of_digit = even ^ (even >> 1);
-      const uint32_t odd = digit == 0 ? 0 : (digit - 1) | 1u;
-      const uint32_t direction_of_digit = static_cast<uint32_t>(std::countr_one(odd)) % 3;
-      const uint32_t next_entry = entry ^ rotate_left(entry_of_digit, turn);
-      const uint32_t next_direction = (direction + direction_of_digit + 1) % 3;
-      steps[orientation * 8 + octant] = {
-          static_cast<uint8_t>(digit), static_cast<uint8_t>((3 * next_entry + next_direction) * 8)};
+    for (uint32_t octants = 0; octants < 64; ++octants) {
+      const Step first = step(orientation, octants / 8), second = step(first.next, octants % 8);
+      steps[orientation * 64 + octants] = second.next << 12 | first.digit << 3 | second.digit;
     }
   }
   return steps;
 }
-constexpr std::array<Step, 24 * 8> kSteps = make_steps();
+
+// The ten bits of a coordinate, two zeros after each.
+constexpr std::array<uint32_t, 1 << kBitsPerAxis> make_spread() {
+  std::array<uint32_t, 1 << kBitsPerAxis> spread{};
+  for (uint32_t value = 0; value < spread.size(); ++value) {
+    for (int bit = 0; bit < kBitsPerAxis; ++bit) spread[value] |= (value >> bit & 1u) << 3 * bit;
+  }
+  return spread;
+}
+
+constexpr std::array<uint32_t, 24 * 64> kDoubleSteps = make_double_steps();
+constexpr std::array<uint32_t, 1 << kBitsPerAxis> kSpread = make_spread();
+
+inline uint32_t key_of_cell(uint32_t x, uint32_t y, uint32_t z) {
+  const uint32_t octants = kSpread[x] | kSpread[y] << 1 | kSpread[z] << 2;
+  uint32_t key = 0, orientation = 0;
+  for (int shift = 24; shift >= 0; shift -= 6) {
+    const uint32_t steps = kDoubleSteps[orientation | (octants >> shift & 63u)];
+    key = key << 6 | (steps & 63u);
+    orientation = steps >> 6;
+  }
+  return key;
+}
 
 struct Bounds {
   Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity());
@@ -72,7 +100,7 @@ class CellGrid {
   uint32_t key(const Eigen::Vector3f& x) const {
     const Eigen::Array3i cell =
         ((x.array() - low_) * cells_per_unit_).min(kCellsPerAxis - 1).cast<int>();
-    return hilbert_key(static_cast<uint32_t>(cell.x()), static_cast<uint32_t>(cell.y()),
+    return key_of_cell(static_cast<uint32_t>(cell.x()), static_cast<uint32_t>(cell.y()),
                        static_cast<uint32_t>(cell.z()));
   }
 
@@ -89,34 +117,37 @@ uint32_t key_of(Item item) { return static_cast<uint32_t>(item >> 32); }
 
 constexpr int64_t kGrain = 1 << 16;
 
-// Sorts from into to by the three 10-bit digits of the key, the least significant first. Each pass
-// is stable, so items that start in index order end in index order within a key. Spoils from.
-void radix_sort(std::span<Item> from, std::span<Item> to) {
+// Moves items to their place by one digit of the key, keeping their order within a digit. Returns
+// where each digit starts in to, and the end.
+using Boundaries = std::array<uint32_t, (1 << kBitsPerAxis) + 1>;
+
+std::unique_ptr<Boundaries> radix_pass(std::span<const Item> from, std::span<Item> to,
+                                       int key_shift) {
   constexpr size_t kRadix = 1 << kBitsPerAxis;
+  const auto digit = [shift = 32 + key_shift](Item item) {
+    return static_cast<size_t>(item >> shift) & (kRadix - 1);
+  };
   const int64_t size = static_cast<int64_t>(from.size());
   std::vector<std::array<uint32_t, kRadix>> starts(static_cast<size_t>(num_chunks(size, kGrain)));
-  for (int pass = 0; pass < 3; ++pass) {
-    const auto digit = [shift = 32 + pass * kBitsPerAxis](Item item) {
-      return static_cast<size_t>(item >> shift) & (kRadix - 1);
-    };
-    parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-      auto& count = starts[static_cast<size_t>(begin / kGrain)];
-      count.fill(0);
-      for (int64_t i = begin; i < end; ++i) ++count[digit(from[static_cast<size_t>(i)])];
-    });
-    uint32_t start = 0;
-    for (size_t value = 0; value < kRadix; ++value) {
-      for (auto& chunk : starts) start += std::exchange(chunk[value], start);
-    }
-    parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-      auto& next = starts[static_cast<size_t>(begin / kGrain)];
-      for (int64_t i = begin; i < end; ++i) {
-        const Item item = from[static_cast<size_t>(i)];
-        to[next[digit(item)]++] = item;
-      }
-    });
-    std::swap(from, to);
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    auto& count = starts[static_cast<size_t>(begin / kGrain)];
+    for (int64_t i = begin; i < end; ++i) ++count[digit(from[static_cast<size_t>(i)])];
+  });
+  auto boundaries = std::make_unique<Boundaries>();
+  uint32_t start = 0;
+  for (size_t value = 0; value < kRadix; ++value) {
+    (*boundaries)[value] = start;
+    for (auto& chunk : starts) start += std::exchange(chunk[value], start);
   }
+  boundaries->back() = start;
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    auto& next = starts[static_cast<size_t>(begin / kGrain)];
+    for (int64_t i = begin; i < end; ++i) {
+      const Item item = from[static_cast<size_t>(i)];
+      to[next[digit(item)]++] = item;
+    }
+  });
+  return boundaries;
 }
 
 class HilbertSorter {
@@ -129,26 +160,24 @@ class HilbertSorter {
   void sort(std::span<Item> items, std::span<Item> scratch) const {
     const CellGrid grid(bounds_of(items));
     if (!grid.is_divisible()) return;
-    const auto size = static_cast<int64_t>(items.size());
-    std::span<Item> keyed = size < kGrain ? items : scratch;
-    parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    const bool few = items.size() < kFew;
+    const std::span<Item> keyed = few ? items : scratch;
+    parallel_for(static_cast<int64_t>(items.size()), kGrain, [&](int64_t begin, int64_t end) {
       for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
         const uint32_t index = index_of(items[i]);
         keyed[i] = Item{grid.key(positions_[index])} << 32 | index;
       }
     });
-    if (size < kGrain) {
+    if (few) {
       std::sort(items.begin(), items.end());
+      sort_long_runs(items, scratch);
     } else {
-      radix_sort(scratch, items);
+      sort_buckets(items, scratch, *radix_pass(scratch, items, 2 * kBitsPerAxis));
     }
-    sort_long_runs(items, scratch);
   }
 
  private:
-  struct Run {
-    size_t begin, size;
-  };
+  static constexpr size_t kFew = 1024;
 
   Bounds bounds_of(std::span<const Item> items) const {
     const auto size = static_cast<int64_t>(items.size());
@@ -170,25 +199,42 @@ class HilbertSorter {
     return all;
   }
 
+  // The items are in 1024 buckets by the upper third of their key; most buckets fit in a cache.
+  void sort_buckets(std::span<Item> items, std::span<Item> scratch,
+                    const Boundaries& boundaries) const {
+    const auto is_large = [&](size_t b) {
+      return boundaries[b + 1] - boundaries[b] > static_cast<size_t>(4 * kGrain);
+    };
+    const auto sort_bucket = [&](size_t b) {
+      const size_t begin = boundaries[b], size = boundaries[b + 1] - begin;
+      sort_bucket_by_rest_of_key(items.subspan(begin, size), scratch.subspan(begin, size));
+    };
+    const size_t buckets = boundaries.size() - 1;
+    for (size_t b = 0; b < buckets; ++b) {
+      if (is_large(b)) sort_bucket(b);  // on all threads
+    }
+    parallel_for(static_cast<int64_t>(buckets), 1, [&](int64_t begin, int64_t) {
+      if (!is_large(static_cast<size_t>(begin))) sort_bucket(static_cast<size_t>(begin));
+    });
+  }
+
+  void sort_bucket_by_rest_of_key(std::span<Item> items, std::span<Item> scratch) const {
+    if (items.size() < kFew) {
+      std::sort(items.begin(), items.end());
+    } else {
+      radix_pass(items, scratch, 0);
+      radix_pass(scratch, items, kBitsPerAxis);
+    }
+    sort_long_runs(items, scratch);
+  }
+
   void sort_long_runs(std::span<Item> items, std::span<Item> scratch) const {
-    std::vector<Run> short_enough;  // for one thread
     for (size_t begin = 0, end = 0; begin < items.size(); begin = end) {
       const uint32_t key = key_of(items[begin]);
       while (end < items.size() && key_of(items[end]) == key) ++end;
-      const size_t size = end - begin;
-      if (size <= max_run_) continue;
-      if (size > static_cast<size_t>(kGrain)) {
-        sort(items.subspan(begin, size), scratch.subspan(begin, size));
-      } else {
-        short_enough.push_back({begin, size});
-      }
+      if (end - begin <= max_run_) continue;
+      sort(items.subspan(begin, end - begin), scratch.subspan(begin, end - begin));
     }
-    parallel_for(static_cast<int64_t>(short_enough.size()), 64, [&](int64_t begin, int64_t end) {
-      for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-        const Run& run = short_enough[i];
-        sort(items.subspan(run.begin, run.size), scratch.subspan(run.begin, run.size));
-      }
-    });
   }
 
   std::span<const Eigen::Vector3f> positions_;
@@ -211,25 +257,26 @@ void check_positions(std::span<const Eigen::Vector3f> positions) {
 }  // namespace
 
 uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z) {
-  uint32_t key = 0, orientation = 0;
-  for (int bit = kBitsPerAxis - 1; bit >= 0; --bit) {
-    const uint32_t octant = (x >> bit & 1u) | (y >> bit & 1u) << 1 | (z >> bit & 1u) << 2;
-    const Step step = kSteps[orientation + octant];
-    key = key << 3 | step.digit;
-    orientation = step.next;
-  }
-  return key;
+  check(std::max({x, y, z}) < 1u << kBitsPerAxis, "hilbert_key: coordinates below 1024");
+  return key_of_cell(x, y, z);
 }
 
-std::vector<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run) {
+LargeArray<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run) {
   check(max_run >= 1, "hilbert_order: max_run >= 1");
   check_positions(positions);
-  std::vector<Item> items(positions.size()), scratch(positions.size());
-  std::iota(items.begin(), items.end(), Item{0});
-  if (!items.empty()) HilbertSorter(positions, max_run).sort(items, scratch);
-  scratch = {};
-  std::vector<uint32_t> order(items.size());
-  std::transform(items.begin(), items.end(), order.begin(), index_of);
+  const auto size = static_cast<int64_t>(positions.size());
+  LargeArray<Item> items(positions.size());
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    std::iota(items.begin() + begin, items.begin() + end, static_cast<Item>(begin));
+  });
+  if (size > 0) {
+    LargeArray<Item> scratch(positions.size());
+    HilbertSorter(positions, max_run).sort(items, scratch);
+  }
+  LargeArray<uint32_t> order(positions.size());
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    std::transform(items.begin() + begin, items.begin() + end, order.begin() + begin, index_of);
+  });
   return order;
 }
 

@@ -6,7 +6,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
-#include <vector>
+
+#include "vggtcd/core/large_array.h"
 
 namespace vggtcd {
 
@@ -20,6 +21,6 @@ uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z);
 // that this does not tell apart are in ascending order of index. The same on any number of threads.
 // Positions are finite, else Error{kInternal}; at most 2^31 - 1 of them. Needs 16 bytes per point
 // while it runs.
-std::vector<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run);
+LargeArray<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run);
 
 }  // namespace vggtcd

@@ -9,6 +9,7 @@
 
 #include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/large_array.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/hilbert_order.h"
 #include "vggtcd/geometry/nearest_neighbors_tree.h"
@@ -19,9 +20,9 @@ namespace {
 constexpr size_t kLanes = kNearestNeighborLanes;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-std::vector<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
-  const std::vector<uint32_t> order = hilbert_order(points, kNearestNeighborLanes);
-  std::vector<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
+LargeArray<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
+  const LargeArray<uint32_t> order = hilbert_order(points, kNearestNeighborLanes);
+  LargeArray<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
   parallel_for(static_cast<int64_t>(blocks.size()), 1024, [&](int64_t begin, int64_t end) {
     for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {
       for (size_t lane = 0; lane < kLanes; ++lane) {
@@ -37,28 +38,38 @@ std::vector<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
   return blocks;
 }
 
+float least(const float* values) {
+  float result = values[0];
+  for (size_t i = 1; i < kLanes; ++i) result = values[i] < result ? values[i] : result;
+  return result;
+}
+float largest(const float* values) {
+  float result = values[0];
+  for (size_t i = 1; i < kLanes; ++i) result = values[i] > result ? values[i] : result;
+  return result;
+}
+
 // Child c of a node, from the block or the node that it is.
 void set_child(BoxNode& node, size_t c, const PointBlock& block) {
   const float* coordinates[3] = {block.x, block.y, block.z};
   for (int axis = 0; axis < 3; ++axis) {
-    const auto [low, high] = std::minmax_element(coordinates[axis], coordinates[axis] + kLanes);
-    node.low[axis][c] = *low;
-    node.high[axis][c] = *high;
+    node.low[axis][c] = least(coordinates[axis]);
+    node.high[axis][c] = largest(coordinates[axis]);
   }
   node.min_index[c] = *std::min_element(block.index, block.index + kLanes);
 }
 
 void set_child(BoxNode& node, size_t c, const BoxNode& child) {
   for (int axis = 0; axis < 3; ++axis) {
-    node.low[axis][c] = *std::min_element(child.low[axis], child.low[axis] + kLanes);
-    node.high[axis][c] = *std::max_element(child.high[axis], child.high[axis] + kLanes);
+    node.low[axis][c] = least(child.low[axis]);
+    node.high[axis][c] = largest(child.high[axis]);
   }
   node.min_index[c] = *std::min_element(child.min_index, child.min_index + kLanes);
 }
 
 template <typename Child>
-std::vector<BoxNode> make_level(const std::vector<Child>& children) {
-  std::vector<BoxNode> nodes((children.size() + kLanes - 1) / kLanes);
+LargeArray<BoxNode> make_level(const LargeArray<Child>& children) {
+  LargeArray<BoxNode> nodes((children.size() + kLanes - 1) / kLanes);
   parallel_for(static_cast<int64_t>(nodes.size()), 256, [&](int64_t begin, int64_t end) {
     for (size_t n = static_cast<size_t>(begin); n < static_cast<size_t>(end); ++n) {
       std::fill_n(&nodes[n].low[0][0], 3 * kLanes, kInfinity);
@@ -100,8 +111,8 @@ Kernel kernel_for_this_processor() {
 
 struct NearestNeighborIndex::Impl {
   size_t size = 0;
-  std::vector<PointBlock> blocks;
-  std::vector<std::vector<BoxNode>> levels;
+  LargeArray<PointBlock> blocks;
+  std::vector<LargeArray<BoxNode>> levels;
 
   explicit Impl(std::span<const Eigen::Vector3f> targets)
       : size(targets.size()), blocks(make_blocks(targets)) {
@@ -111,7 +122,7 @@ struct NearestNeighborIndex::Impl {
     check(levels.size() <= kMaxTreeLevels, "nearest neighbors: tree too high");
   }
 
-  void query(const std::vector<PointBlock>& queries, float bound, std::span<float> distance,
+  void query(const LargeArray<PointBlock>& queries, float bound, std::span<float> distance,
              std::span<int32_t> index) const {
     check(bound >= 0, "nearest neighbors: bound >= 0");
     check(index.empty() || index.size() == distance.size(),
