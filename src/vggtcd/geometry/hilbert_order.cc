@@ -261,7 +261,7 @@ uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z) {
   return key_of_cell(x, y, z);
 }
 
-LargeArray<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run) {
+HilbertOrder hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run) {
   check(max_run >= 1, "hilbert_order: max_run >= 1");
   check_positions(positions);
   const auto size = static_cast<int64_t>(positions.size());
@@ -273,11 +273,7 @@ LargeArray<uint32_t> hilbert_order(std::span<const Eigen::Vector3f> positions, i
     LargeArray<Item> scratch(positions.size());
     HilbertSorter(positions, max_run).sort(items, scratch);
   }
-  LargeArray<uint32_t> order(positions.size());
-  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-    std::transform(items.begin() + begin, items.begin() + end, order.begin() + begin, index_of);
-  });
-  return order;
+  return HilbertOrder(std::move(items));
 }
 
 }  // namespace vggtcd

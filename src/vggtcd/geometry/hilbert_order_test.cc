@@ -60,8 +60,10 @@ Points random_points(size_t count, unsigned seed) {
 }
 
 std::vector<uint32_t> order_of(const Points& points, int64_t max_run) {
-  const LargeArray<uint32_t> order = hilbert_order(points, max_run);
-  return {order.begin(), order.end()};
+  const HilbertOrder order = hilbert_order(points, max_run);
+  std::vector<uint32_t> indices;
+  for (size_t i = 0; i < order.size(); ++i) indices.push_back(order[i]);
+  return indices;
 }
 
 bool is_permutation_of_indices(std::vector<uint32_t> order, size_t count) {

@@ -21,7 +21,7 @@ constexpr size_t kLanes = kNearestNeighborLanes;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 LargeArray<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
-  const LargeArray<uint32_t> order = hilbert_order(points, kNearestNeighborLanes);
+  const HilbertOrder order = hilbert_order(points, kNearestNeighborLanes);
   LargeArray<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
   parallel_for(static_cast<int64_t>(blocks.size()), 1024, [&](int64_t begin, int64_t end) {
     for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {

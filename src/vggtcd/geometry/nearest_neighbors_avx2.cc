@@ -20,6 +20,11 @@ struct Avx2Lanes {
   static uint32_t bits(Mask mask) {
     return static_cast<uint32_t>(_mm256_movemask_ps(mask.a) | _mm256_movemask_ps(mask.b) << 8);
   }
+  static void assign(Mask where, int32_t value, int32_t* p) {
+    const __m256i values = _mm256_set1_epi32(value);
+    _mm256_maskstore_epi32(p, _mm256_castps_si256(where.a), values);
+    _mm256_maskstore_epi32(p + 8, _mm256_castps_si256(where.b), values);
+  }
   void store(float* p) const {
     _mm256_store_ps(p, a);
     _mm256_store_ps(p + 8, b);

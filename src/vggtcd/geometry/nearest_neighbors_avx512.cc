@@ -24,6 +24,9 @@ struct Avx512Lanes {
   static Avx512Lanes load(const float* aligned) { return {_mm512_load_ps(aligned)}; }
   static Avx512Lanes all(float value) { return {_mm512_set1_ps(value)}; }
   static uint32_t bits(Mask mask) { return mask; }
+  static void assign(Mask where, int32_t value, int32_t* aligned) {
+    _mm512_mask_store_epi32(aligned, where, _mm512_set1_epi32(value));
+  }
   void store(float* aligned) const { _mm512_store_ps(aligned, v); }
 
   friend Avx512Lanes operator+(Avx512Lanes a, Avx512Lanes b) { return {_mm512_add_ps(a.v, b.v)}; }

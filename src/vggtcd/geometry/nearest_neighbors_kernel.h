@@ -90,6 +90,13 @@ class PacketSearch {
 
   // The nearest child first; it usually settles most of the others.
   void visit_node(int level, int64_t number) {
+    if (level == 0) {
+      visit_blocks_of(number);
+      return;
+    }
+    const auto visit = [&](int child) {
+      visit_node(level - 1, number * kNearestNeighborLanes + child);
+    };
     const BoxNode& node = tree_.levels[level][number];
     const V distances = box_to_boxes(node);
     uint32_t pending = V::bits(less_equal(distances, V::all(worst_)));
@@ -100,21 +107,28 @@ class PacketSearch {
       const V nearest = V::all(min_of(distances));
       const int child = __builtin_ctz(V::bits(equal(distances, nearest)));
       pending &= ~(1u << child);
-      if (matters(distance[child], node.min_index[child])) visit_child(level, number, node, child);
+      if (matters(distance[child], node.min_index[child])) visit(child);
     }
     for (; pending != 0; pending &= pending - 1) {
       const int child = __builtin_ctz(pending);
-      if (matters(distance[child], node.min_index[child])) visit_child(level, number, node, child);
+      if (matters(distance[child], node.min_index[child])) visit(child);
     }
   }
 
-  void visit_child(int level, int64_t number, const BoxNode& node, int child) {
-    const int64_t child_number = number * kNearestNeighborLanes + child;
-    if (level > 0) {
-      visit_node(level - 1, child_number);
-    } else if (child_number != seed_ &&
-               V::bits(less_equal(queries_to_box(node, child), best_)) != 0) {
-      visit_block(static_cast<int32_t>(child_number));
+  // The blocks of a node of the lowest level.
+  void visit_blocks_of(int64_t number) {
+    const BoxNode& node = tree_.levels[0][number];
+    const V distances = box_to_boxes(node);
+    uint32_t pending = V::bits(less_equal(distances, V::all(worst_)));
+    const int64_t first = number * kNearestNeighborLanes;
+    if (seed_ >= first && seed_ < first + kNearestNeighborLanes)
+      pending &= ~(1u << (seed_ - first));
+    while (pending != 0) {
+      const int child = __builtin_ctz(pending);
+      pending &= pending - 1;
+      if (V::bits(less_equal(queries_to_box(node, child), best_)) == 0) continue;
+      visit_block(static_cast<int32_t>(first + child));
+      pending &= V::bits(less_equal(distances, V::all(worst_)));
     }
   }
 
@@ -128,16 +142,11 @@ class PacketSearch {
     }
     const uint32_t equally_near = want_index_ ? V::bits(equal(nearest, best_)) : 0;
     const auto nearer = less(nearest, best_);
-    if (const uint32_t lanes = V::bits(nearer); lanes != 0) {
-      best_ = select(nearer, nearest, best_);
-      worst_ = max_of(best_);
-      for (uint32_t rest = lanes; rest != 0; rest &= rest - 1) {
-        const int lane = __builtin_ctz(rest);
-        best_block_[lane] = number;
-        best_index_[lane] = kLowestIndexNotYetKnown;
-      }
-      if (want_index_) worst_index_ = kLowestIndexNotYetKnown;
-    }
+    best_ = min(best_, nearest);
+    worst_ = max_of(best_);
+    V::assign(nearer, number, best_block_);
+    V::assign(nearer, kLowestIndexNotYetKnown, best_index_);
+    if (want_index_ && V::bits(nearer) != 0) worst_index_ = kLowestIndexNotYetKnown;
     if (equally_near != 0) settle_ties(number, equally_near);
   }
 
@@ -203,8 +212,8 @@ class PacketSearch {
   // Of each query: squared distance to its best target so far, the block that holds it, and its
   // index, which is looked up late: only when a tie must be settled, or at the end.
   V best_;
-  int32_t best_block_[kNearestNeighborLanes];
-  int32_t best_index_[kNearestNeighborLanes];
+  alignas(64) int32_t best_block_[kNearestNeighborLanes];
+  alignas(64) int32_t best_index_[kNearestNeighborLanes];
   float worst_;          // the largest in best_
   int32_t worst_index_;  // a box of equal distance matters if it holds an index below this
   int32_t seed_ = kNoBlock;

@@ -30,6 +30,11 @@ struct ArrayLanes {
     return make([&](int) { return value; });
   }
   static uint32_t bits(Mask mask) { return mask; }
+  static void assign(Mask where, int32_t value, int32_t* p) {
+    for (int i = 0; i < kNearestNeighborLanes; ++i) {
+      if ((where >> i & 1u) != 0) p[i] = value;
+    }
+  }
   void store(float* p) const {
     for (int i = 0; i < kNearestNeighborLanes; ++i) p[i] = v[i];
   }
