@@ -7,7 +7,9 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/synthetic/truth_file.h"
 #include "vggtcd/geometry/umeyama.h"
+#include "vggtcd/io/colmap.h"
 #include "vggtcd/io/image_write.h"
+#include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
@@ -47,6 +49,42 @@ Sim3 world_from_pass(const EpochTruth& truth, const Reconstruction& pass) {
   return fit.y_from_x;
 }
 
+// wat/SCENE/images/{before,after}/*.jpg and sparse/0, as COLMAP left it.
+void write_wat(const fs::path& root, const fs::path& photos, const SyntheticScene& scene,
+               const SceneTruth& truth, int photo_scale) {
+  const fs::path base = root / scene.name;
+  std::vector<View> views;
+  std::vector<ColoredPoint> points;
+  for (const Epoch which : kEpochs) {
+    const char* folder = kEpochFolder[static_cast<int>(which)];
+    make_directory(base / "images" / folder);
+    const EpochTruth& epoch = truth.of(which);
+    for (const View& view : epoch.views) {
+      std::error_code error;
+      fs::copy_file(photos / folder / view.name, base / "images" / folder / view.name, error);
+      if (error) {
+        throw_error(ErrorCode::kOutput, "{}: {}", (base / "images").string(), error.message());
+      }
+      views.push_back({view.camera_from_world, scaled_pinhole(view.pinhole, photo_scale),
+                       std::string(folder) + "/" + view.name});
+    }
+    // Sparse points of the static background.
+    for (size_t pixel = 0; pixel < epoch.label.size(); pixel += 997) {
+      if (epoch.label[pixel] != kLabelUnchanged) continue;
+      const View& view = epoch.views[pixel / epoch.pixels_per_frame()];
+      const size_t in_frame = pixel % epoch.pixels_per_frame();
+      const size_t width = static_cast<size_t>(epoch.width);
+      points.push_back(
+          {view.camera_from_world.inverse() *
+               view.pinhole.unproject(static_cast<double>(in_frame % width),
+                                      static_cast<double>(in_frame / width), epoch.depth_m[pixel]),
+           {epoch.color[3 * pixel], epoch.color[3 * pixel + 1], epoch.color[3 * pixel + 2]}});
+    }
+  }
+  make_directory(base / "sparse" / "0");
+  write_colmap_binary(base / "sparse" / "0", views, points);
+}
+
 }  // namespace
 
 void SynthesizeOptions::validate() const {
@@ -66,27 +104,26 @@ void synthesize(const fs::path& directory, const SynthesizeOptions& options,
                 ProgressSink& progress) {
   options.validate();
   const SyntheticScene scene = make_scene(options.scene, options.seed);
-  std::error_code ignored;
-  if (fs::exists(directory, ignored) && !fs::is_empty(directory, ignored)) {
-    throw_error(ErrorCode::kOutput, "{}: expected a new or empty directory, found files in it",
-                directory.string());
-  }
-  for (const char* folder : kEpochFolder) {
-    make_directory(options.photos ? directory / folder : directory);
+  OutputDirectory out(directory);
+  if (options.photos) {
+    for (const char* folder : kEpochFolder) out.subdirectory(folder);
   }
   const SceneTruth truth =
       render(scene, options.render, progress, [&](Epoch which, int frame, const Image& photo) {
         if (!options.photos) return;
-        write_jpeg(
-            directory / kEpochFolder[static_cast<int>(which)] / fmt::format("{:04d}.jpg", frame),
-            photo, options.jpeg_quality);
+        write_jpeg(out / kEpochFolder[static_cast<int>(which)] / fmt::format("{:04d}.jpg", frame),
+                   photo, options.jpeg_quality);
       });
   const SimulatedPredictions predictions =
       simulate_predictions(scene, truth, options.keyframes, options.errors);
-  write_reconstruction(directory / "t1.npz", predictions.t1.reconstruction);
-  write_reconstruction(directory / "t2.npz", predictions.t2.reconstruction);
-  write_joint(directory / "joint.npz", predictions.joint);
-  write_truth(directory, scene, truth, options, predictions);
+  write_reconstruction(out / "t1.npz", predictions.t1.reconstruction);
+  write_reconstruction(out / "t2.npz", predictions.t2.reconstruction);
+  write_joint(out / "joint.npz", predictions.joint);
+  write_truth(out.path(), scene, truth, options, predictions);
+  if (options.wat) {
+    write_wat(out / "wat", out.path(), scene, truth, options.render.photo_scale);
+  }
+  out.commit();
 }
 
 }  // namespace vggtcd

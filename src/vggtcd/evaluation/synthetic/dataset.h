@@ -40,7 +40,8 @@ struct SynthesizeOptions {
 // two fits are composed. What a registration can reach at best, to first order.
 Sim3 best_t2_from_t1(const SceneTruth& truth, const Reconstruction& t1, const Reconstruction& t2);
 
-// Writes the files into `directory`, which must be new or empty (Error{kOutput}).
+// Writes the files. `directory` must be new, empty or earlier results, which are replaced as a
+// whole when all is written (io/output_directory.h); Error{kOutput}.
 void synthesize(const std::filesystem::path& directory, const SynthesizeOptions& options,
                 ProgressSink& progress);
 

@@ -4,10 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
 #include <map>
 
+#include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/io/npz.h"
@@ -18,19 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path fresh_directory(const std::string& name) {
-  const fs::path path = fs::temp_directory_path() / ("vggtcd_dataset_test_" + name);
-  fs::remove_all(path);
-  return path;
-}
-
 std::map<std::string, std::string> all_bytes(const fs::path& directory) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(directory)) {
     if (!entry.is_regular_file()) continue;
-    std::ifstream in(entry.path(), std::ios::binary);
-    files[fs::relative(entry.path(), directory).string()] = {std::istreambuf_iterator<char>(in),
-                                                             {}};
+    files[fs::relative(entry.path(), directory).string()] = file_bytes(entry.path());
   }
   return files;
 }
@@ -46,10 +37,11 @@ SynthesizeOptions tiny() {
 }
 
 TEST(Synthesize, SameSeedSameBytesOnAnyNumberOfThreads) {
+  const TemporaryDirectory temporary;
   std::map<std::string, std::string> first;
   const int before = num_threads();
   for (const int threads : {1, 3}) {
-    const fs::path directory = fresh_directory("threads");
+    const fs::path directory = temporary.path() / std::to_string(threads);
     set_num_threads(threads);
     synthesize(directory, tiny(), silent_progress());
     const auto files = all_bytes(directory);
@@ -57,22 +49,22 @@ TEST(Synthesize, SameSeedSameBytesOnAnyNumberOfThreads) {
     if (first.empty()) first = files;
     ASSERT_EQ(files.size(), first.size());
     for (const auto& [name, bytes] : files) EXPECT_TRUE(bytes == first[name]) << name;
-    fs::remove_all(directory);
   }
   set_num_threads(before);
   SynthesizeOptions other = tiny();
   other.seed = 8;
-  const fs::path directory = fresh_directory("seed");
+  const fs::path directory = temporary.path() / "seed";
   synthesize(directory, other, silent_progress());
   for (const auto& [name, bytes] : all_bytes(directory)) {
-    if (name.ends_with("cameras.bin")) continue;  // the camera is the same
+    // The camera is the same, and so is the mark of a directory of results.
+    if (name.ends_with("cameras.bin") || name.starts_with(".")) continue;
     EXPECT_FALSE(bytes == first[name]) << name;
   }
-  fs::remove_all(directory);
 }
 
 TEST(Synthesize, WritesPredictionsAndTruthThatFit) {
-  const fs::path directory = fresh_directory("read");
+  const TemporaryDirectory temporary;
+  const fs::path directory = temporary.path() / "read";
   synthesize(directory, tiny(), silent_progress());
   const Reconstruction t1 = read_reconstruction(directory / "t1.npz", silent_progress());
   const Reconstruction t2 = read_reconstruction(directory / "t2.npz", silent_progress());
@@ -91,13 +83,13 @@ TEST(Synthesize, WritesPredictionsAndTruthThatFit) {
   }
   EXPECT_NEAR(truth.read<double>("scale")[0], make_scene("coffee_corner", 7).scale_t2_from_t1,
               1e-12);
-  fs::remove_all(directory);
 }
 
 TEST(Synthesize, RefusesADirectoryWithFilesInIt) {
-  const fs::path directory = fresh_directory("full");
+  const TemporaryDirectory temporary;
+  const fs::path directory = temporary.path() / "full";
   fs::create_directories(directory);
-  std::ofstream(directory / "thesis.txt") << "precious";
+  write_bytes(directory / "thesis.txt", "precious");
   try {
     synthesize(directory, tiny(), silent_progress());
     FAIL();
@@ -105,7 +97,6 @@ TEST(Synthesize, RefusesADirectoryWithFilesInIt) {
     EXPECT_EQ(error.code(), ErrorCode::kOutput);
   }
   EXPECT_EQ(all_bytes(directory).size(), 1u);
-  fs::remove_all(directory);
 }
 
 }  // namespace

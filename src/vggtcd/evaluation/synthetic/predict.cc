@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
@@ -19,31 +20,30 @@ using Eigen::Vector3d;
 // Streams of random numbers; one per cause, so that switching one off leaves the others alone.
 enum Stream : uint64_t { kWarp = 1, kDepth, kPixel, kDrift, kFocal, kOutlier, kConfidence, kScale };
 
-// A smooth vector field of a few random waves, about as long as the scene or half of it. It bends
-// points and cameras alike: the network's world is consistent but not quite straight.
-class Warp {
+// A smooth random vector field: a few waves of random direction, length and push. Each component
+// has unit variance.
+class SmoothField {
  public:
-  Warp(double amplitude_m, double extent_m, Random random) {
+  SmoothField(double shortest_m, double longest_m, Random random) {
     for (Wave& wave : waves_) {
       const Vector3d direction{random.normal(), random.normal(), random.normal()};
-      const double wavelength = extent_m * random.uniform(0.5, 1.5);
+      const double wavelength = random.uniform(shortest_m, longest_m);
       wave.frequency = 2 * std::numbers::pi / wavelength * direction.normalized();
       wave.phase = random.uniform(0, 2 * std::numbers::pi);
       const Vector3d push{random.normal(), random.normal(), random.normal()};
-      wave.push_m = push * amplitude_m * std::sqrt(2.0 / kWaves);
+      wave.push = push * std::sqrt(2.0 / kWaves);
     }
   }
-  Vector3d displacement(const Vector3d& x) const {
+  Vector3d value(const Vector3d& x) const {
     Vector3d sum = Vector3d::Zero();
-    for (const Wave& wave : waves_)
-      sum += wave.push_m * std::sin(wave.frequency.dot(x) + wave.phase);
+    for (const Wave& wave : waves_) sum += wave.push * std::sin(wave.frequency.dot(x) + wave.phase);
     return sum;
   }
-  // Half the curl: how the field turns a small body.
-  Vector3d rotation(const Vector3d& x) const {
+  // Half the curl: how a displacement by the field turns a small body.
+  Vector3d turn(const Vector3d& x) const {
     Vector3d sum = Vector3d::Zero();
     for (const Wave& wave : waves_) {
-      sum += 0.5 * wave.frequency.cross(wave.push_m) * std::cos(wave.frequency.dot(x) + wave.phase);
+      sum += 0.5 * wave.frequency.cross(wave.push) * std::cos(wave.frequency.dot(x) + wave.phase);
     }
     return sum;
   }
@@ -51,7 +51,7 @@ class Warp {
  private:
   static constexpr int kWaves = 6;
   struct Wave {
-    Vector3d frequency, push_m;
+    Vector3d frequency, push;
     double phase = 0;
   };
   Wave waves_[kWaves];
@@ -88,17 +88,6 @@ class LowFrequency {
   double nodes_[kColumns * kRows];
 };
 
-// A first-order random walk that forgets: unit variance, correlated over about `memory` steps.
-struct Wander {
-  Vector3d value = Vector3d::Zero();
-  void step(Random& random, double memory) {
-    const double keep = std::exp(-1.0 / memory);
-    const double fresh = std::sqrt(1 - keep * keep);
-    const Vector3d kick{random.normal(), random.normal(), random.normal()};
-    value = keep * value + fresh * kick;
-  }
-};
-
 struct FrameErrors {
   double factor = 1;  // of an outlier
   double scale = 1;
@@ -115,27 +104,25 @@ class PassSimulator {
       : truth_(truth),
         errors_(errors),
         key_(mix64(seed, draw)),
-        warp_(errors.warp * truth.extent_m, truth.extent_m, Random(key_, {kWarp})) {}
+        warp_(0.5 * truth.extent_m, 1.5 * truth.extent_m, Random(key_, {kWarp})),
+        drift_rotation_(0.15 * truth.extent_m, 0.5 * truth.extent_m, Random(key_, {kDrift, 1})),
+        drift_translation_(0.15 * truth.extent_m, 0.5 * truth.extent_m, Random(key_, {kDrift, 2})) {
+  }
 
   std::vector<FrameErrors> draw_frame_errors(const std::vector<FrameRef>& frames) const {
     std::vector<FrameErrors> result;
     Random drift(key_, {kDrift}), focal(key_, {kFocal}), outlier(key_, {kOutlier}),
         scale(key_, {kScale});
     const double pass_focal = 1 + errors_.focal * focal.normal();
-    Wander rotation, translation;
-    rotation.step(drift, 1e-3);
-    translation.step(drift, 1e-3);
     for (size_t k = 0; k < frames.size(); ++k) {
       FrameErrors frame;
       const bool out = outlier.uniform() < errors_.outlier_share && k > 0;
       frame.factor = out ? errors_.outlier_factor : 1.0;
       frame.scale = 1 + frame.factor * errors_.frame_scale * scale.normal();
       frame.focal = pass_focal + errors_.focal / 3 * focal.normal();
-      const double memory = std::max(2.0, static_cast<double>(frames.size()) / 4);
-      rotation.step(drift, memory);
-      translation.step(drift, memory);
-      frame.camera_from_warped =
-          displaced_camera(frames[k], frame.factor, rotation.value, translation.value);
+      const Vector3d turn{drift.normal(), drift.normal(), drift.normal()};
+      const Vector3d shift{drift.normal(), drift.normal(), drift.normal()};
+      frame.camera_from_warped = displaced_camera(frames[k], frame.factor, turn, shift);
       result.push_back(frame);
     }
     return result;
@@ -146,7 +133,7 @@ class PassSimulator {
     const EpochTruth& epoch = truth_.of(ref.epoch);
     const size_t per_frame = epoch.pixels_per_frame();
     const size_t source = static_cast<size_t>(ref.frame) * per_frame;
-    std::vector<double> depth_m = warped_depth(ref, frame);
+    std::vector<double> depth_m = warped_depth(ref);
     std::vector<double> ideal = depth_m;
     smear_edges(depth_m, epoch.width, epoch.height);
 
@@ -186,28 +173,44 @@ class PassSimulator {
     return 1 + std::exp(unsure) * 0.4 / std::pow(relative_error + 2e-3, 0.7);
   }
 
-  Rigid3 displaced_camera(const FrameRef& ref, double factor, const Vector3d& rotation,
-                          const Vector3d& translation) const {
-    const Rigid3& camera_from_world =
-        truth_.of(ref.epoch).views[static_cast<size_t>(ref.frame)].camera_from_world;
+  Vector3d warp_m(const Vector3d& x) const {
+    return errors_.warp * truth_.extent_m * warp_.value(x);
+  }
+
+  // The camera after the warp: it moves and turns with the world around it.
+  Rigid3 warped_camera(const Rigid3& camera_from_world, const Vector3d& extra_shift_m,
+                       const Eigen::Matrix3d& extra_turn) const {
     const Vector3d eye = camera_center(camera_from_world);
-    const Vector3d moved_eye = eye + warp_.displacement(eye) +
-                               factor * errors_.drift_translation * truth_.extent_m * translation;
-    const double rad = errors_.drift_rotation_deg * std::numbers::pi / 180;
     const Eigen::Matrix3d turn =
-        small_rotation(warp_.rotation(eye)) * small_rotation(factor * rad * rotation);
+        small_rotation(errors_.warp * truth_.extent_m * warp_.turn(eye)) * extra_turn;
     Rigid3 result;
     result.rotation = camera_from_world.rotation * turn.transpose();
-    result.translation = -(result.rotation * moved_eye);
+    result.translation = -(result.rotation * (eye + warp_m(eye) + extra_shift_m));
     return result;
   }
 
+  // Drift: cameras near each other err alike, whatever their place in the list (the network knows
+  // no order of photos); 0.8 of the standard deviation is shared so, 0.6 is each photo's own.
+  Rigid3 displaced_camera(const FrameRef& ref, double factor, const Vector3d& own_turn,
+                          const Vector3d& own_shift) const {
+    const Rigid3& camera_from_world =
+        truth_.of(ref.epoch).views[static_cast<size_t>(ref.frame)].camera_from_world;
+    const Vector3d eye = camera_center(camera_from_world);
+    const Vector3d turn = 0.8 * drift_rotation_.value(eye) + 0.6 * own_turn;
+    const Vector3d shift = 0.8 * drift_translation_.value(eye) + 0.6 * own_shift;
+    const double rad = errors_.drift_rotation_deg * std::numbers::pi / 180;
+    return warped_camera(camera_from_world,
+                         factor * errors_.drift_translation * truth_.extent_m * shift,
+                         small_rotation(factor * rad * turn));
+  }
+
   // The depth of the warped surface in the warped (not yet drifted) camera; sky far behind.
-  std::vector<double> warped_depth(const FrameRef& ref, const FrameErrors&) const {
+  std::vector<double> warped_depth(const FrameRef& ref) const {
     const EpochTruth& epoch = truth_.of(ref.epoch);
     const View& view = epoch.views[static_cast<size_t>(ref.frame)];
     const Rigid3 world_from_camera = view.camera_from_world.inverse();
-    const Rigid3 camera_from_warped = displaced_camera(ref, 0, Vector3d::Zero(), Vector3d::Zero());
+    const Rigid3 camera_from_warped =
+        warped_camera(view.camera_from_world, Vector3d::Zero(), Eigen::Matrix3d::Identity());
     const size_t first = static_cast<size_t>(ref.frame) * epoch.pixels_per_frame();
     std::vector<double> depth_m(epoch.pixels_per_frame());
     for (int v = 0; v < epoch.height; ++v) {
@@ -219,8 +222,7 @@ class PassSimulator {
           continue;
         }
         const Vector3d point = world_from_camera * view.pinhole.unproject(u, v, truth);
-        depth_m[pixel] =
-            std::max(0.01, (camera_from_warped * (point + warp_.displacement(point))).z());
+        depth_m[pixel] = std::max(0.01, (camera_from_warped * (point + warp_m(point))).z());
       }
     }
     return depth_m;
@@ -254,7 +256,7 @@ class PassSimulator {
   const SceneTruth& truth_;
   const ErrorModel& errors_;
   uint64_t key_;
-  Warp warp_;
+  SmoothField warp_, drift_rotation_, drift_translation_;
 };
 
 double mean_distance_m(const SceneTruth& truth, Epoch which) {

@@ -32,9 +32,10 @@ struct ErrorModel {
           "relative depth error per frame that varies over about a quarter of the photo");
     field("depth_pixel", self.depth_pixel, "relative depth error per pixel");
     field("frame_scale", self.frame_scale, "relative depth scale per frame");
-    field("drift_rotation_deg", self.drift_rotation_deg, "rotation that wanders along the walk");
+    field("drift_rotation_deg", self.drift_rotation_deg,
+          "error of a camera's rotation, alike for near cameras");
     field("drift_translation", self.drift_translation,
-          "translation that wanders along the walk, of the extent");
+          "error of a camera's place, alike for near cameras, of the extent");
     field("focal", self.focal, "relative focal length of the pass; a third of it per frame");
     field("edge_blur_px", self.edge_blur_px,
           "depth is smeared over this many px of a 518 px photo at depth edges");
@@ -60,7 +61,7 @@ struct SimulatedPass {
 };
 
 // `units_per_metre` is the scale of the pass; `draw` selects the errors, so that two passes over
-// the same frames differ. All errors depend on (scene seed, draw, position in the list) alone.
+// the same frames differ. All errors depend on (seed, draw, position in the list, place) alone.
 SimulatedPass simulate_pass(const SceneTruth& truth, const std::vector<FrameRef>& frames,
                             double units_per_metre, const ErrorModel& errors, uint64_t seed,
                             uint64_t draw);

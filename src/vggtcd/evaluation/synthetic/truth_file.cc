@@ -3,15 +3,12 @@
 #include "vggtcd/evaluation/synthetic/truth_file.h"
 
 #include <Eigen/Geometry>
-#include <nlohmann/json.hpp>
 
 #include "vggtcd/io/npz.h"
-#include "vggtcd/io/output_file.h"
+#include "vggtcd/io/sim3_file.h"
 
 namespace vggtcd {
 namespace {
-
-using nlohmann::ordered_json;
 
 // Arrays in the shapes that NumPy users expect. They must live until the writer is finished.
 struct EpochArrays {
@@ -56,20 +53,14 @@ void add_arrays(NpzWriter& writer, const std::string& epoch, const EpochTruth& t
   writer.add_mask("unseen_by_other_" + epoch, {s, h, w}, arrays.unseen);
 }
 
-ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-ordered_json json_of(const Eigen::Matrix3d& m) {
-  ordered_json rows;
+Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+Json json_of(const Eigen::Matrix3d& m) {
+  Json rows;
   for (int row = 0; row < 3; ++row) rows.push_back(json_of(Eigen::Vector3d(m.row(row))));
   return rows;
 }
-ordered_json json_of(const Sim3& sim3) {
-  return {{"scale", sim3.scale},
-          {"rotation", json_of(sim3.rotation)},
-          {"translation", json_of(sim3.translation)}};
-}
-
 // The box of an object in world axes: centre, rotation (columns are its axes) and size.
-ordered_json box_of(const SceneObject& object, const Rigid3& world_from_object) {
+Json box_of(const SceneObject& object, const Rigid3& world_from_object) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e30), high = -low;
   for (const Mesh::Vertex& vertex : object.mesh.vertices) {
     low = low.cwiseMin(vertex.position_m.cast<double>());
@@ -89,20 +80,20 @@ std::vector<int64_t> changed_pixels(const SyntheticScene& scene, const EpochTrut
   return count;
 }
 
-ordered_json objects_json(const SyntheticScene& scene, const SceneTruth& truth) {
+Json objects_json(const SyntheticScene& scene, const SceneTruth& truth) {
   const std::vector<int64_t> pixels[] = {changed_pixels(scene, truth.of(Epoch::kT1)),
                                          changed_pixels(scene, truth.of(Epoch::kT2))};
-  ordered_json list = ordered_json::array();
+  Json list = Json::array();
   for (size_t k = 0; k < scene.objects.size(); ++k) {
     const SceneObject& object = scene.objects[k];
     if (object.change() == ObjectChange::kUnchanged) continue;
-    ordered_json entry{
+    Json entry{
         {"instance", k + 1}, {"name", object.name}, {"class", enum_to_string(object.change())}};
     for (const Epoch which : kEpochs) {
       const int e = static_cast<int>(which);
       const auto& pose = object.world_from_object[e];
       const std::string suffix = e == 0 ? "_t1" : "_t2";
-      entry["box" + suffix] = pose ? box_of(object, *pose) : ordered_json();
+      entry["box" + suffix] = pose ? box_of(object, *pose) : Json();
       entry["changed_pixels" + suffix] = pixels[e][k + 1];
     }
     list.push_back(std::move(entry));
@@ -119,19 +110,6 @@ double changed_share(const SceneTruth& truth) {
     }
   }
   return static_cast<double>(changed) / static_cast<double>(std::max<int64_t>(1, surface));
-}
-
-template <typename Options>
-ordered_json options_json(const Options& options) {
-  ordered_json result;
-  for_each_field(options, [&](std::string_view name, const auto& value, std::string_view) {
-    if constexpr (requires { std::remove_cvref_t<decltype(value)>::fields; }) {
-      result[std::string(name)] = options_json(value);
-    } else {
-      result[std::string(name)] = value;
-    }
-  });
-  return result;
 }
 
 }  // namespace
@@ -153,20 +131,20 @@ void write_truth(const std::filesystem::path& directory, const SyntheticScene& s
   writer.add<double>("translation", {3}, std::span(nominal.translation.data(), 3));
   writer.finish();
 
-  const ordered_json json{
+  const Json json{
       {"scene", scene.name},
       {"outdoor", scene.outdoor},
-      {"options", options_json(options)},
+      {"options", options_to_json(options)},
       {"extent_m", truth.extent_m},
       {"changed_share", changed_share(truth)},
-      {"t2_from_t1", json_of(nominal)},
-      {"t2_from_t1_best_fit", json_of(best)},
-      {"t1_from_world", json_of(predictions.t1.pass_from_world)},
-      {"t2_from_world", json_of(predictions.t2.pass_from_world)},
-      {"joint_from_world", json_of(predictions.joint_from_world)},
+      {"t2_from_t1", sim3_to_json(nominal)},
+      {"t2_from_t1_best_fit", sim3_to_json(best)},
+      {"t1_from_world", sim3_to_json(predictions.t1.pass_from_world)},
+      {"t2_from_world", sim3_to_json(predictions.t2.pass_from_world)},
+      {"joint_from_world", sim3_to_json(predictions.joint_from_world)},
       {"objects", objects_json(scene, truth)},
   };
-  write_text_file(directory / "truth.json", json.dump(1) + "\n");
+  write_json_file(directory / "truth.json", json);
 }
 
 }  // namespace vggtcd
