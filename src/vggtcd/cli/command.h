@@ -38,6 +38,8 @@ void add_register(Program& program);
 void add_reconstruct(Program& program);
 void add_weights(Program& program);
 void add_synthesize(Program& program);
+void add_benchmark(Program& program);
+void add_evaluate(Program& program);
 
 // The flag of a field: static_factor -> --static-factor.
 std::string flag_of(std::string_view field);

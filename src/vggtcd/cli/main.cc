@@ -32,6 +32,8 @@ int run(int argc, char** argv) {
   add_reconstruct(program);
   add_weights(program);
   add_synthesize(program);
+  add_benchmark(program);
+  add_evaluate(program);
   try {
     program.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// Suites: a list of scenes, each kept when finished, and the report over all.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/core/version.h"
+#include "vggtcd/evaluation/benchmark.h"
+#include "vggtcd/evaluation/benchmark_json.h"
+#include "vggtcd/evaluation/benchmark_report.h"
+#include "vggtcd/evaluation/registration_methods.h"
+#include "vggtcd/evaluation/wat.h"
+#include "vggtcd/io/json_file.h"
+
+namespace vggtcd {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> chosen_scenes(const std::string& list,
+                                       const std::vector<std::string>& available) {
+  if (list == "all") return available;
+  std::vector<std::string> chosen;
+  size_t start = 0;
+  while (start <= list.size()) {
+    const size_t comma = std::min(list.find(',', start), list.size());
+    const std::string name = list.substr(start, comma - start);
+    if (std::find(available.begin(), available.end(), name) == available.end()) {
+      std::string known;
+      for (const std::string& each : available) known += (known.empty() ? "" : ", ") + each;
+      throw_error(ErrorCode::kUsage, "scenes: expected some of {}, found '{}'", known, name);
+    }
+    chosen.push_back(name);
+    start = comma + 1;
+  }
+  return chosen;
+}
+
+// What a kept result must agree with to be used again.
+Json fingerprint(const BenchmarkOptions& options) {
+  Json json = options_to_json(options);
+  for (const char* irrelevant : {"scenes", "seeds", "first_seed"}) json.erase(irrelevant);
+  json["version"] = kVersion;
+  Json methods = Json::array();
+  for (const RegistrationMethod& method : registration_methods()) {
+    if (method.run) methods.push_back(method.name);
+  }
+  json["methods"] = methods;
+  return json;
+}
+
+// Calls `run` unless the file has the outcome of the same options.
+SceneOutcome resume_or_run(const fs::path& file, const Json& options,
+                           const std::function<SceneOutcome()>& run, ProgressSink& progress) {
+  if (fs::exists(file)) {
+    try {
+      const Json kept = read_json_file(file);
+      if (kept.at("options") == options) {
+        progress.notice(fmt::format("{}: finished before, kept", file.filename().string()));
+        return scene_outcome_from_json(kept.at("outcome"));
+      }
+    } catch (const std::exception& error) {
+      progress.notice(
+          fmt::format("{}: not usable, computed again ({})", file.string(), error.what()));
+    }
+  }
+  SceneOutcome outcome = run();
+  write_json_file(file, Json{{"options", options}, {"outcome", to_json(outcome)}});
+  return outcome;
+}
+
+void make_output(const fs::path& out) {
+  std::error_code error;
+  fs::create_directories(out / "scenes", error);
+  if (error) {
+    throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", out.string(), error.message());
+  }
+}
+
+}  // namespace
+
+std::vector<SceneOutcome> run_synthetic_suite(const fs::path& out, const BenchmarkOptions& options,
+                                              ProgressSink& progress) {
+  options.validate();
+  std::vector<std::string> available(scene_names().begin(), scene_names().end());
+  SuiteReport report{"synthetic", options, {}};
+  const std::vector<std::string> scenes = chosen_scenes(options.scenes, available);
+  make_output(out);
+  for (const std::string& scene : scenes) {
+    for (int k = 0; k < options.seeds; ++k) {
+      const uint64_t seed = options.first_seed + static_cast<uint64_t>(k);
+      const fs::path file = out / "scenes" / fmt::format("{}_{}.json", scene, seed);
+      progress.notice(fmt::format("{} #{}", scene, seed));
+      report.scenes.push_back(resume_or_run(
+          file, fingerprint(options),
+          [&] { return run_synthetic_scene(scene, seed, options, progress); }, progress));
+    }
+  }
+  write_report(out, report);
+  return std::move(report.scenes);
+}
+
+std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& data,
+                                        const fs::path& predictions,
+                                        const BenchmarkOptions& options, ProgressSink& progress) {
+  options.validate();
+  SuiteReport report{"wat", options, {}};
+  const std::vector<std::string> scenes = chosen_scenes(options.scenes, list_wat_scenes(data));
+  make_output(out);
+  Json key = fingerprint(options);
+  key["data"] = fs::absolute(data).lexically_normal().string();
+  key["predictions"] = fs::absolute(predictions).lexically_normal().string();
+  for (const std::string& scene : scenes) {
+    progress.notice(scene);
+    report.scenes.push_back(resume_or_run(
+        out / "scenes" / (scene + ".json"), key,
+        [&] { return run_wat_scene(scene, data, predictions, options, progress); }, progress));
+  }
+  write_report(out, report);
+  return std::move(report.scenes);
+}
+
+}  // namespace vggtcd

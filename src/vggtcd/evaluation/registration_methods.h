@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The methods that the benchmark compares, behind one signature.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+struct RegistrationProblem {
+  const Reconstruction& before;
+  const Reconstruction& after;
+  const JointReconstruction& joint;
+};
+
+struct RegistrationMethod {
+  std::string name;   // in JSON and CSV: "ransac_icp"
+  std::string title;  // in tables: "RANSAC+ICP"
+  bool rival = false;
+  // T2 from T1. Throws Error{kDegenerate} if the method finds no answer. Absent: not available in
+  // this build; the row says so.
+  std::function<Sim3(const RegistrationProblem&)> run;
+  std::string absent_because;
+};
+
+// In the order of the paper's tables: identity, the rivals, coarse only, the paper's method, and
+// what came later.
+std::vector<RegistrationMethod> registration_methods();
+
+}  // namespace vggtcd
