@@ -70,6 +70,7 @@ class DictParser {
     const size_t end = text_.find(text_[0], 1);
     if (end == std::string_view::npos) return std::nullopt;
     std::string value(text_.substr(1, end - 1));
+    if (value.find('\n') != std::string::npos) return std::nullopt;
     text_.remove_prefix(end + 1);
     return value;
   }
@@ -89,6 +90,7 @@ class DictParser {
       if (text_[i] == '[') ++depth;
       if (text_[i] == ']' && --depth == 0) {
         descr = std::string(text_.substr(0, i + 1));
+        if (descr.find('\n') != std::string::npos) return false;
         text_.remove_prefix(i + 1);
         return true;
       }
@@ -195,7 +197,11 @@ NpyHeader read_npy_header(const ReadBytes& read, std::string_view what) {
   std::string text(length, '\0');
   read(std::as_writable_bytes(std::span(text)));
 
-  std::optional<NpyHeader> header = DictParser(text).parse();
+  // A type is shown in messages of one line; the final newline is NumPy's.
+  const bool printable =
+      std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= 0x20 || c == '\n'; });
+  std::optional<NpyHeader> header =
+      printable ? DictParser(text).parse() : std::optional<NpyHeader>();
   if (!header || size_overflows(*header)) {
     throw_error(ErrorCode::kInput, "{}: expected an array header as NumPy writes it, found {}",
                 what,

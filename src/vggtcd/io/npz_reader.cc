@@ -12,6 +12,7 @@
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/io/npz.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -166,6 +167,11 @@ void NpzReader::index() {
     if (!member.ends_with(".npy")) continue;
     Entry entry{std::string(member.substr(0, member.size() - 4)), i, {}};
     const std::string what = name_ + ": " + entry.key;
+    // Keys go into messages of one line.
+    if (std::any_of(member.begin(), member.end(), [](unsigned char c) { return c < 0x20; })) {
+      throw_error(ErrorCode::kInput, "{}: expected an array's name, found {}", name_,
+                  quote(entry.key));
+    }
     const bool stored = stat.comp_method == ZIP_CM_STORE;
     if (!stored && stat.comp_method != ZIP_CM_DEFLATE) {
       throw_error(ErrorCode::kInput, "{}: expected stored or deflated data, found zip method {}",

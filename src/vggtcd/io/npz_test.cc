@@ -177,6 +177,20 @@ TEST(NpzReader, ASizeThatTheShapeDoesNotNeedIsAnInputError) {
                      "a.npz: x: expected 36 bytes of data for shape [3, 3], found 24");
 }
 
+TEST(NpzReader, NamesAndTypesCannotBreakTheLineOfAMessage) {
+  const TemporaryDirectory directory;
+  const std::vector<float> values(6);
+  for (const std::string key : {"two\nlines", "x"}) {
+    NpzWriter writer(directory / "a.npz");
+    writer.add<float>(key, {2, 3}, values);
+    writer.finish();
+    std::string bytes = file_bytes(directory / "a.npz");
+    if (key == "x") bytes.replace(bytes.find("'<f4'"), 5, "'<\n4'");
+    const auto read = [&] { NpzReader(std::as_bytes(std::span(bytes)), "a.npz").read<float>(key); };
+    EXPECT_INPUT_ERROR(read(), "a.npz: ");
+  }
+}
+
 TEST(NpzWriter, ReaderGetsBackWhatWasAdded) {
   const TemporaryDirectory directory;
   const std::vector<float> f{1.5f, -2, 3};

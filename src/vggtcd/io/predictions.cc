@@ -104,8 +104,8 @@ Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std:
   return {k[0], k[4], k[2], k[5], static_cast<int>(layout.width), static_cast<int>(layout.height)};
 }
 
-// The photos' names, without directories: results are named after them. Names that are empty or
-// not distinct are of no use and are replaced like missing ones.
+// The photos' names, without directories. Results are named after them without the extension, so
+// names that are empty or not distinct then are of no use and are replaced like missing ones.
 std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout& layout) {
   std::vector<std::string> names;
   if (npz.has("names")) {
@@ -116,8 +116,10 @@ std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout
       if (!name.empty() && name != "." && name != "..") names.push_back(name);
     }
   }
+  std::set<std::string> stems;
+  for (const std::string& name : names) stems.insert(std::filesystem::path(name).stem().string());
   const size_t frames = static_cast<size_t>(layout.frames);
-  if (names.size() != frames || std::set(names.begin(), names.end()).size() != frames) {
+  if (stems.size() != frames || names.size() != frames) {
     names.clear();
     for (size_t i = 0; i < frames; ++i) names.push_back(fmt::format("frame_{:06d}", i));
   }
@@ -209,6 +211,25 @@ void drop_invalid_pixels(const std::string& name, Reconstruction& result, Progre
   }
 }
 
+// Stores a run of images, [S, H, W, 3] or in planes [S, 3, H, W], as level(value).
+template <typename T, typename Level>
+void put_colors(int64_t first, std::span<const T> values, bool planes, Reconstruction& result,
+                const Level& level) {
+  const size_t begin = static_cast<size_t>(first);
+  if (!planes) {
+    std::transform(values.begin(), values.end(), result.color.begin() + first, level);
+    return;
+  }
+  const size_t per_frame = result.pixels_per_frame();
+  for (size_t i = 0; i < values.size();) {  // plane by plane
+    const size_t plane = (begin + i) / per_frame, pixel = (begin + i) % per_frame;
+    const size_t count = std::min(values.size() - i, per_frame - pixel);
+    uint8_t* color = result.color.data() + ((plane / 3) * per_frame + pixel) * 3 + plane % 3;
+    for (size_t k = 0; k < count; ++k) color[3 * k] = level(values[i + k]);
+    i += count;
+  }
+}
+
 // images is [S, 3, H, W] or [S, H, W, 3], u8 or a float in [0, 1].
 void read_colors(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result,
                  ProgressSink& progress) {
@@ -225,32 +246,24 @@ void read_colors(const NpzReader& npz, const PredictionLayout& layout, Reconstru
     npz.expect_shape(layout.images,
                      std::vector<int64_t>{layout.frames, layout.height, layout.width, 3});
   }
-  const size_t per_frame = result.pixels_per_frame();
-  // [S, 3, H, W] -> [S, H, W, 3]
-  const auto target = [&](size_t index) {
-    if (!planes) return index;
-    const size_t plane = index / per_frame;
-    return ((plane / 3) * per_frame + index % per_frame) * 3 + plane % 3;
-  };
   if (header.kind == NpyKind::kUnsigned) {
     npz.read_slabs<uint8_t>(layout.images, [&](int64_t first, std::span<const uint8_t> values) {
-      for (size_t i = 0; i < values.size(); ++i) {
-        result.color[target(static_cast<size_t>(first) + i)] = values[i];
-      }
+      put_colors(first, values, planes, result, [](uint8_t level) { return level; });
     });
     return;
   }
   expect_float(npz, layout.images);
   npz.read_slabs<float>(layout.images, [&](int64_t first, std::span<const float> values) {
-    for (size_t i = 0; i < values.size(); ++i) {
-      if (!(values[i] >= -1e-3f && values[i] <= 1.001f)) {
-        throw_error(ErrorCode::kInput, "{}: {}: expected values in [0, 1], found {:g}", npz.name(),
-                    layout.images, values[i]);
-      }
-      const float level = std::clamp(values[i], 0.0f, 1.0f) * 255.0f;
-      result.color[target(static_cast<size_t>(first) + i)] =
-          static_cast<uint8_t>(std::lround(level));
+    const auto bad = std::find_if(values.begin(), values.end(),
+                                  [](float v) { return !(v >= -1e-3f && v <= 1.001f); });
+    if (bad != values.end()) {
+      throw_error(ErrorCode::kInput, "{}: {}: expected values in [0, 1], found {:g}", npz.name(),
+                  layout.images, *bad);
     }
+    // To the nearest level; bicubic resizing may have left the range by a trace.
+    put_colors(first, values, planes, result, [](float value) {
+      return static_cast<uint8_t>(std::clamp(value, 0.0f, 1.0f) * 255.0f + 0.5f);
+    });
   });
 }
 

@@ -328,6 +328,7 @@ TEST(ReadReconstruction, NamesLoseDirectoriesAndMustBeDistinct) {
   const auto numbered = ElementsAre("frame_000000", "frame_000001", "frame_000002", "frame_000003");
   EXPECT_THAT(names_of({"x/a.jpg", "y/a.jpg", "b.jpg", "c.jpg"}), numbered);
   EXPECT_THAT(names_of({"a", "b", "..", "d"}), numbered);
+  EXPECT_THAT(names_of({"a.jpg", "a.png", "c", "d"}), numbered);
 }
 
 // Two epochs of four frames and a joint file with two keyframes of each.
