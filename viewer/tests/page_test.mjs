@@ -93,7 +93,7 @@ test('clicking a camera shows its photo, and one can look from it', async () => 
   await card.waitFor();
   const photo = report.photos[Number(await card.getAttribute('data-photo'))];
   assert.ok((await card.textContent()).includes(photo.name));
-  await page.waitForFunction(() => document.querySelector('.photo-card canvas').width === 160);
+  await page.waitForFunction(() => document.querySelector('.photo-card canvas').width === 960);
   await card.getByRole('button', { name: /Look from here/ }).click();
   await page.waitForFunction(() => window.vggtcd.viewer.navigation.isAtCamera());
   const m = photo.camera_from_world;
@@ -190,7 +190,7 @@ test('photos stand side by side under a wipe to the heat map', async () => {
   const { page, troubles, close } = await open(browser, file);
   await page.getByRole('tab', { name: 'Photos' }).click();
   await page.locator('.thumb').nth(2).click();
-  await page.waitForFunction(() => [...document.querySelectorAll('.pane canvas')].every((c) => c.width === 160));
+  await page.waitForFunction(() => [...document.querySelectorAll('.pane canvas')].every((c) => c.width === 960));
   await page.waitForFunction((name) => document.querySelector('.pane canvas').getAttribute('aria-label').includes(name),
     report.photos[2].name);
   const looks = new Set();

@@ -112,7 +112,7 @@ test('without WebGL photos and numbers remain, and the page says why', async () 
   assert.ok((await page.textContent('#no-webgl')).includes('no WebGL'));
   await shot(page, 'no_webgl');
   await page.getByRole('button', { name: 'Show the photos' }).click();
-  await page.waitForFunction(() => document.querySelector('.pane canvas').width === 64);
+  await page.waitForFunction(() => document.querySelector('.pane canvas').width === 512);
   for (const key of ['n', ']', 'Enter', 'm', 'F2', 'F2', '0', 'ArrowLeft', 'Escape']) await page.keyboard.press(key);
   await page.getByRole('tab', { name: 'Numbers' }).click();
   assert.ok((await page.textContent('#pane-numbers')).includes('Scale ratio'));

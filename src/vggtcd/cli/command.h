@@ -35,6 +35,7 @@ CLI::App* add_command(Program& program, CLI::App& parent, const std::string& nam
 // The subcommands, one .cc each, in the order of --help.
 void add_detect(Program& program);
 void add_register(Program& program);
+void add_view(Program& program);
 void add_reconstruct(Program& program);
 void add_weights(Program& program);
 void add_synthesize(Program& program);

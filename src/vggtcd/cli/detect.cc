@@ -33,14 +33,17 @@ void add_detect(Program& program) {
         fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
                    percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
                    percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
-        fmt::print("Look at {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
-                   arguments->epochs.out);
+        fmt::print(
+            "Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
+            arguments->epochs.out);
       });
   arguments->epochs.add_to(command);
   add_fields(command, arguments->options.alignment, "Alignment");
   add_fields(command, arguments->options.change, "Change");
   add_field(command, "overlays", arguments->options.overlays,
             "Write overlays/: each photo beside its heat map.");
+  add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");
+  add_fields(command, arguments->options.report, "Page");
   command->footer(
       "Example:\n"
       "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n\n"

@@ -29,6 +29,7 @@ int run(int argc, char** argv) {
       "'vggt-cd COMMAND --help' explains a command. Exit statuses: docs/formats.md.");
   add_detect(program);
   add_register(program);
+  add_view(program);
   add_reconstruct(program);
   add_weights(program);
   add_synthesize(program);

@@ -9,6 +9,7 @@
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/pipeline/results.h"
 #include "vggtcd/registration/shared_intrinsics.h"
+#include "vggtcd/report/read_results.h"
 
 namespace vggtcd {
 namespace {
@@ -77,6 +78,7 @@ Json summary_head(const char* command, const EpochInputs& inputs, const Epochs& 
 void DetectOptions::validate() const {
   alignment.validate();
   change.validate();
+  report.validate();
 }
 
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
@@ -127,6 +129,17 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   summary["change"] = change_json(changes);
   summary["stages"] = stages_json(log);
   write_json_file(aside / "summary.json", summary);
+
+  // 5. Show: the page is made from the files above, as `vggt-cd view` makes it, so the two agree.
+  if (options.page) {
+    epochs = {};
+    changes = {};
+    log.run("report page", [&](ProgressStage& stage) {
+      const ReportInput input = read_results(aside);
+      stage.advance(0.5);
+      write_report(input, options.report, aside / "report.html");
+    });
+  }
   directory.commit();
   return outcome;
 }

@@ -7,6 +7,7 @@
 
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/pipeline/alignment.h"
+#include "vggtcd/report/report_page.h"
 
 namespace vggtcd {
 
@@ -23,11 +24,15 @@ struct DetectOptions {
   AlignmentOptions alignment;
   ChangeOptions change;
   bool overlays = true;
+  bool page = true;
+  ReportOptions report;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("alignment", self.alignment, "");
     field("change", self.change, "");
     field("overlays", self.overlays, "Write overlays/: each photo beside its heat map.");
+    field("page", self.page, "Write report.html: everything in one page.");
+    field("report", self.report, "");
   };
   void validate() const;
 };

@@ -70,6 +70,7 @@ function alignment(report: Report): HTMLElement {
   const scale = asNumber(find(sim3 ?? summary, 'scale'));
   const coarse = asNumber(find(summary, 'median_residual_coarse_u', 'coarse_residual_u'));
   const fine = asNumber(find(summary, 'median_residual_fine_u', 'fine_residual_u'));
+  const sigma = asNumber(find(summary, 'residual_sigma_u'));
   const figure = (label: string, value: string, note = ''): HTMLElement =>
     h('div', { class: 'figure' }, h('span', {}, label), h('b', {}, value), h('small', {}, note));
   const ofExtent = (value: number): string => `${percent(value / report.scene.extent)} of the extent`;
@@ -78,6 +79,7 @@ function alignment(report: Report): HTMLElement {
       scale === null ? null : figure('Scale ratio', `× ${number(scale, 4)}`, 'after ÷ before'),
       coarse === null ? null : figure('Coarse residual', `${number(coarse)} ${unit}`, ofExtent(coarse)),
       fine === null ? null : figure('Fine residual', `${number(fine)} ${unit}`, ofExtent(fine)),
+      sigma === null ? null : figure('Robust residual, σ', `${number(sigma)} ${unit}`, ofExtent(sigma)),
       figure('Extent of the scene', `${number(report.scene.extent)} ${unit}`)),
     sim3 ? h('details', {}, h('summary', {}, 'The similarity transform'), table(sim3)) : null);
 }

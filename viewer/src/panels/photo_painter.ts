@@ -12,7 +12,7 @@ export class PhotoPainter {
   private layer: HTMLCanvasElement | null = null;  // the heat map as last coloured
   private layerKey = '';
 
-  constructor(private readonly report: Report, private readonly maxWidth = 1600) {
+  constructor(private readonly report: Report) {
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('role', 'img');
   }
@@ -34,9 +34,10 @@ export class PhotoPainter {
     this.picture = picture;
     this.heat = heat;
     this.layerKey = '';
-    const width = Math.min(this.maxWidth, photo.width || 4);
-    this.canvas.width = width;
-    this.canvas.height = Math.max(1, Math.round((width * photo.height) / Math.max(photo.width, 1)));
+    // Small photos are drawn larger, so that the edges of the map stay sharp on a large screen.
+    const zoom = Math.ceil(900 / Math.max(photo.width, 1));
+    this.canvas.width = Math.max(1, Math.min(zoom, 8) * photo.width);
+    this.canvas.height = Math.max(1, Math.min(zoom, 8) * photo.height);
     this.canvas.setAttribute('aria-label', `${photo.epoch}: ${photo.name}`);
     this.paint(state);
     return true;
@@ -46,7 +47,7 @@ export class PhotoPainter {
     const context = this.canvas.getContext('2d');
     if (!context || !this.picture) return;
     const { width, height } = this.canvas;
-    context.globalAlpha = 1;
+    context.imageSmoothingQuality = 'high';
     context.fillStyle = '#888';
     context.fillRect(0, 0, width, height);
     if (this.picture.naturalWidth > 0) context.drawImage(this.picture, 0, 0, width, height);
@@ -57,11 +58,12 @@ export class PhotoPainter {
     context.beginPath();
     context.rect(0, 0, edge, height);
     context.clip();
+    context.imageSmoothingEnabled = false;
     context.drawImage(this.layer!, 0, 0, width, height);
     context.restore();
     if (edge < width) {
       context.fillStyle = '#fff';
-      context.fillRect(edge - 1, 0, 2, height);
+      context.fillRect(edge - 1, 0, Math.max(2, Math.round(width / 450)), height);
     }
   }
 

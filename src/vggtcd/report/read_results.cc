@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// What `detect` left in its directory, read back for the report page.
+#include "vggtcd/report/read_results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/io/colmap.h"
+#include "vggtcd/io/image_file.h"
+#include "vggtcd/io/json_file.h"
+#include "vggtcd/io/npz.h"
+#include "vggtcd/io/ply.h"
+
+namespace vggtcd {
+namespace {
+
+namespace fs = std::filesystem;
+
+double positive_member(const Json& json, std::string_view key, const fs::path& file) {
+  const Json& value = json_member(json, key, file.string());
+  if (!value.is_number() || !(value.get<double>() > 0)) {
+    throw_error(ErrorCode::kInput, "{}: {}: expected a positive number, found {}", file.string(),
+                key, value.dump());
+  }
+  return value.get<double>();
+}
+
+std::string input_name(const Json& summary, const char* epoch) {
+  const Json::json_pointer path(fmt::format("/inputs/{}/file", epoch));
+  return summary.contains(path) && summary[path].is_string() ? summary[path].get<std::string>()
+                                                             : epoch;
+}
+
+ReportCloud read_cloud(const fs::path& path) {
+  PlyCloud ply = read_ply(path);
+  ReportCloud cloud;
+  const std::vector<float>* distance = ply.field("change_distance");
+  if (!distance) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected a scalar field change_distance, found none; is this a "
+                "result of vggt-cd detect?",
+                path.string());
+  }
+  cloud.change_distance = *distance;
+  if (const std::vector<float>* label = ply.field("label")) {
+    cloud.label.reserve(label->size());
+    for (const float value : *label) {
+      cloud.label.push_back(value >= 0 && value <= 4 ? static_cast<uint8_t>(value) : uint8_t{3});
+    }
+  }
+  cloud.positions = std::move(ply.positions);
+  cloud.color = std::move(ply.rgb);
+  if (cloud.color.empty()) cloud.color.assign(3 * cloud.positions.size(), 128);
+  return cloud;
+}
+
+// The cameras of one epoch in the order in which detect wrote them: that of the frames.
+void add_photos(const ColmapModel& model, std::string_view prefix, const fs::path& file,
+                ReportEpoch& epoch) {
+  for (const auto& [id, image] : model.images) {
+    if (!image.name.starts_with(prefix)) continue;
+    ReportPhoto photo;
+    photo.name = image.name.substr(prefix.size());
+    photo.camera_from_world = image.camera_from_world;
+    const auto camera = model.cameras.find(image.camera_id);
+    if (camera != model.cameras.end() && camera->second.model == "PINHOLE") {
+      const std::vector<double>& p =
+          camera->second.params;  // COLMAP's first pixel centre: (0.5, 0.5)
+      photo.pinhole = Pinhole{p.at(0),
+                              p.at(1),
+                              p.at(2) - 0.5,
+                              p.at(3) - 0.5,
+                              static_cast<int>(camera->second.width),
+                              static_cast<int>(camera->second.height)};
+    }
+    epoch.photos.push_back(std::move(photo));
+  }
+  const size_t frames =
+      epoch.score.size() / (static_cast<size_t>(epoch.width) * static_cast<size_t>(epoch.height));
+  if (epoch.photos.size() != frames) {
+    throw_error(ErrorCode::kInput, "{}: expected the {} cameras {}* of change.npz, found {}",
+                file.string(), frames, prefix, epoch.photos.size());
+  }
+}
+
+void read_scores(const NpzReader& npz, const std::string& key, ReportEpoch& epoch) {
+  npz.expect_shape(key, std::vector<int64_t>{-1, -1, -1});
+  const auto& shape = npz.header(key).shape;
+  if (std::ranges::any_of(shape, [](int64_t size) { return size == 0 || size > 100000; })) {
+    throw_error(ErrorCode::kInput, "{}: {}: expected 1 to 100000 frames, rows and columns",
+                npz.name(), key);
+  }
+  epoch.height = static_cast<int>(shape[1]);
+  epoch.width = static_cast<int>(shape[2]);
+  epoch.score = npz.read<float>(key);
+}
+
+void read_labels(const NpzReader& npz, const std::string& key, ReportEpoch& epoch) {
+  if (!npz.has(key)) return;
+  npz.expect_shape(key, std::vector<int64_t>{static_cast<int64_t>(epoch.photos.size()),
+                                             epoch.height, epoch.width});
+  epoch.label = npz.read<uint8_t>(key);
+}
+
+// The left part of an overlay is the photo as it is.
+Image read_photo(const fs::path& overlay, int width, int height) {
+  if (!fs::exists(overlay)) return {};
+  const Image whole = read_image(overlay);
+  if (whole.width < width || whole.height < height) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected at least {} x {} px, as in change.npz, found {} x {}",
+                overlay.string(), width, height, whole.width, whole.height);
+  }
+  Image photo(width, height);
+  for (int y = 0; y < height; ++y) {
+    std::copy_n(whole.pixel(0, y), 3 * static_cast<size_t>(width), photo.pixel(0, y));
+  }
+  return photo;
+}
+
+std::function<Image(int)> photo_reader(const fs::path& overlays, const ReportEpoch& epoch) {
+  std::vector<fs::path> paths;
+  for (const ReportPhoto& photo : epoch.photos) {
+    paths.push_back(overlays / (fs::path(photo.name).stem().string() + ".png"));
+  }
+  return [paths, width = epoch.width, height = epoch.height](int i) {
+    return read_photo(paths[static_cast<size_t>(i)], width, height);
+  };
+}
+
+}  // namespace
+
+ReportInput read_results(const fs::path& directory) {
+  const fs::path summary_path = directory / "summary.json";
+  if (!fs::exists(summary_path)) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected a result directory of vggt-cd detect, found no summary.json",
+                directory.string());
+  }
+  ReportInput input;
+  input.summary = read_json_file(summary_path);
+  if (fs::exists(directory / "sim3.json")) input.sim3 = read_json_file(directory / "sim3.json");
+  const Json& change = json_member(input.summary, "change", summary_path.string());
+  input.extent_u = positive_member(change, "scene_extent_u", summary_path);
+  input.threshold_u = positive_member(change, "threshold_u", summary_path);
+  input.bound_u = positive_member(change, "bound_u", summary_path);
+  input.title = fmt::format("{} → {}", input_name(input.summary, "before"),
+                            input_name(input.summary, "after"));
+
+  const NpzReader npz(directory / "change.npz");
+  const ColmapModel model = read_colmap(directory / "colmap");
+  const auto read_epoch = [&](const char* name, const std::string& suffix, const char* cloud,
+                              ReportEpoch& epoch) {
+    read_scores(npz, "score_" + suffix, epoch);
+    add_photos(model, fmt::format("{}/", name), directory / "colmap", epoch);
+    read_labels(npz, "label_" + suffix, epoch);
+    epoch.cloud = read_cloud(directory / cloud);
+    epoch.image = photo_reader(directory / "overlays" / name, epoch);
+  };
+  read_epoch("before", "t1", "before_aligned.ply", input.before);
+  read_epoch("after", "t2", "after.ply", input.after);
+  return input;
+}
+
+}  // namespace vggtcd
