@@ -12,6 +12,7 @@ MAY_INCLUDE = {
     "io": {"core", "geometry", "scene"},
     "nn": {"core"},
     "vggt": {"core", "geometry", "scene", "io", "nn"},
+    "reconstruction": {"core", "geometry", "scene", "io", "nn", "vggt"},
     "registration": {"core", "geometry", "scene"},
     "change": {"core", "geometry", "scene"},
     "evaluation": {"core", "geometry", "scene", "io", "registration", "change"},

@@ -2,7 +2,7 @@
 // Uses the installed library as a stranger would: headers and targets only.
 #include <vggtcd/change/nearest_distance.h>
 #include <vggtcd/core/version.h>
-#include <vggtcd/registration/keyframes.h>
+#include <vggtcd/scene/keyframes.h>
 
 #include <cstdio>
 

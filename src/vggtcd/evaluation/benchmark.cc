@@ -14,7 +14,7 @@
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
-#include "vggtcd/registration/keyframes.h"
+#include "vggtcd/scene/keyframes.h"
 
 namespace vggtcd {
 namespace {

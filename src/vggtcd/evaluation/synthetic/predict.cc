@@ -10,7 +10,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/evaluation/synthetic/random.h"
-#include "vggtcd/registration/keyframes.h"
+#include "vggtcd/scene/keyframes.h"
 
 namespace vggtcd {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vggtcd/registration/keyframes.h"
+#include "vggtcd/scene/keyframes.h"
 
 #include <gmock/gmock.h>
 

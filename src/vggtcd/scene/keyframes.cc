@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Keyframe selection by farthest point sampling in index space (Eq. 2 of the paper).
-#include "vggtcd/registration/keyframes.h"
+#include "vggtcd/scene/keyframes.h"
 
 #include <algorithm>
 #include <cstdlib>

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of a video: evenly spread, and sharp among their neighbours.
+#include "vggtcd/io/video.h"
+
+#include <algorithm>
+
+#include "vggtcd/core/error.h"
+#ifdef VGGTCD_WITH_VIDEO
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "vggtcd/core/interrupt.h"
+#endif
+
+namespace vggtcd {
+
+#ifdef VGGTCD_WITH_VIDEO
+namespace {
+
+Image image_of(const cv::Mat& bgr) {
+  Image image(bgr.cols, bgr.rows);
+  cv::Mat rgb(bgr.rows, bgr.cols, CV_8UC3, image.rgb.data());
+  cv::cvtColor(bgr, rgb, cv::COLOR_BGR2RGB);
+  return image;
+}
+
+// Calls use(number, frame) for every frame; returns how many there are.
+template <typename Use>
+int for_each_frame(const std::string& path, const Use& use) {
+  cv::VideoCapture video(path);
+  int count = 0;
+  for (cv::Mat frame; video.isOpened() && video.read(frame); ++count) {
+    throw_if_interrupted();
+    use(count, frame);
+  }
+  return count;
+}
+
+}  // namespace
+
+std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSink& progress) {
+  ProgressStage stage(progress, "read video");
+  std::vector<double> sharp;
+  const int count = for_each_frame(path, [&](int, const cv::Mat& frame) {
+    // A quarter of the size is enough to rank by, and sixteen times faster.
+    cv::Mat small;
+    cv::resize(frame, small, {}, 0.25, 0.25, cv::INTER_AREA);
+    sharp.push_back(sharpness(image_of(small)));
+  });
+  if (count == 0) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected a video, found no frame that can be decoded; convert it, or extract "
+                "photos from it (ffmpeg -i VIDEO photos/%04d.jpg)",
+                path);
+  }
+  stage.advance(0.5);
+  const int wanted = std::min(frames, count);
+  std::vector<int> chosen;
+  for (int i = 0; i < wanted; ++i) {
+    const auto begin = sharp.begin() + static_cast<std::ptrdiff_t>(int64_t{i} * count / wanted);
+    const auto end = sharp.begin() + static_cast<std::ptrdiff_t>(int64_t{i + 1} * count / wanted);
+    chosen.push_back(static_cast<int>(std::max_element(begin, end) - sharp.begin()));
+  }
+  std::vector<PhotoRef> photos;
+  const std::string name = std::filesystem::path(path).filename().string();
+  for_each_frame(path, [&](int number, const cv::Mat& frame) {
+    if (!std::binary_search(chosen.begin(), chosen.end(), number)) return;
+    photos.push_back({path, fmt::format("{}_{:06d}", name, number),
+                      std::make_shared<const Image>(image_of(frame))});
+  });
+  return photos;
+}
+#else
+std::vector<PhotoRef> read_video(const std::string& path, int, ProgressSink&) {
+  throw_error(ErrorCode::kUnavailable,
+              "{}: this build reads no videos (libopencv-videoio-dev was missing); extract photos "
+              "(ffmpeg -i VIDEO photos/%04d.jpg) and give their folder",
+              path);
+}
+#endif
+
+}  // namespace vggtcd

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs another program to its end, its output in a log file; Ctrl-C ends it too.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace vggtcd {
+
+// Runs arguments[0], looked up in PATH, and waits for it. Standard output and error are appended to
+// `log`; standard input is empty; QT_QPA_PLATFORM=offscreen, so that programs with a user
+// interface run without a display. Returns the exit status, or 128 + signal. Throws
+// Error{kUnavailable} ending in `remedy` if there is no such program, Error{kInterrupted} after
+// ending it when an interrupt was requested. The child also ends when this process does.
+int run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
+                const std::string& remedy);
+
+}  // namespace vggtcd

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vggtcd/reconstruction/features.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "vggtcd/core/parallel.h"
+
+namespace vggtcd {
+namespace {
+
+Features random_features(int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::gamma_distribution<double> value(0.5);
+  Features features;
+  for (int i = 0; i < count; ++i) {
+    std::vector<double> v(kDescriptorSize);
+    double sum = 0;
+    for (double& x : v) sum += x = value(random);
+    for (const double x : v) {
+      features.descriptors.push_back(static_cast<int16_t>(std::lround(512 * std::sqrt(x / sum))));
+    }
+    features.points.push_back({0, 0, 1, 0});
+  }
+  return features;
+}
+
+// The definition: for each descriptor all angles, sorted.
+std::vector<std::pair<int, int>> matches_by_definition(const Features& a, const Features& b) {
+  const auto nearest = [](const Features& from, size_t i, const Features& to) {
+    std::vector<std::pair<double, int>> angles;
+    for (size_t j = 0; j < to.points.size(); ++j) {
+      double product = 0;
+      for (size_t k = 0; k < kDescriptorSize; ++k) {
+        product += double{1} * from.descriptors[i * kDescriptorSize + k] *
+                   to.descriptors[j * kDescriptorSize + k];
+      }
+      angles.emplace_back(std::acos(std::min(1.0, product / (512.0 * 512.0))), static_cast<int>(j));
+    }
+    std::sort(angles.begin(), angles.end());
+    const bool distinct = angles[0].first < 0.7 && angles[0].first < 0.8 * angles[1].first;
+    return distinct ? angles[0].second : -1;
+  };
+  std::vector<std::pair<int, int>> matches;
+  for (size_t i = 0; i < a.points.size(); ++i) {
+    const int j = nearest(a, i, b);
+    if (j >= 0 && nearest(b, static_cast<size_t>(j), a) == static_cast<int>(i)) {
+      matches.emplace_back(static_cast<int>(i), j);
+    }
+  }
+  return matches;
+}
+
+TEST(MatchDescriptors, FindsWhatTheDefinitionFinds) {
+  Features a = random_features(61, 1);
+  Features b = random_features(83, 2);
+  // Some of b are disturbed copies of a's: more and more disturbed, so that some fail the test.
+  std::mt19937 random(3);
+  for (size_t i = 0; i < 40; ++i) {
+    std::normal_distribution<double> noise(0, 1.0 * static_cast<double>(i));
+    for (size_t k = 0; k < kDescriptorSize; ++k) {
+      b.descriptors[(i + 7) * kDescriptorSize + k] = static_cast<int16_t>(
+          std::max(0.0, a.descriptors[i * kDescriptorSize + k] + noise(random)));
+    }
+  }
+  const auto expected = matches_by_definition(a, b);
+  ASSERT_GT(expected.size(), 10u);
+  ASSERT_LT(expected.size(), 40u);
+  std::vector<std::pair<int, int>> found;
+  for (const Match& m : match_descriptors(a, b)) found.emplace_back(m.first, m.second);
+  EXPECT_EQ(found, expected);
+}
+
+TEST(MatchDescriptors, FindsNothingInAnEmptyPhoto) {
+  EXPECT_TRUE(match_descriptors(random_features(5, 1), Features{}).empty());
+  EXPECT_TRUE(match_descriptors(Features{}, random_features(5, 1)).empty());
+}
+
+// A wall of random discs, seen through a window that starts at (left, top).
+Image wall(int left, int top) {
+  Image image(320, 240);
+  std::mt19937 random(5);
+  std::fill(image.rgb.begin(), image.rgb.end(), uint8_t{90});
+  for (int disc = 0; disc < 400; ++disc) {
+    const int x = static_cast<int>(random() % 400), y = static_cast<int>(random() % 300);
+    const int radius = 3 + static_cast<int>(random() % 10);
+    const auto color = static_cast<uint8_t>(random() % 256);
+    for (int v = std::max(0, y - top - radius); v < std::min(240, y - top + radius); ++v) {
+      for (int u = std::max(0, x - left - radius); u < std::min(320, x - left + radius); ++u) {
+        const int du = u + left - x, dv = v + top - y;
+        if (du * du + dv * dv < radius * radius) std::fill_n(image.pixel(u, v), 3, color);
+      }
+    }
+  }
+  return image;
+}
+
+TEST(MatchAll, FindsTheShiftOfAWallAndThatItIsAPlaneWithTheSameBitsForAnyThreads) {
+  const std::vector<Image> photos = {wall(0, 0), wall(23, 11), wall(60, 40)};
+  std::vector<std::vector<PhotoPair>> found;
+  for (const int threads : {1, 3}) {
+    set_num_threads(threads);
+    ProgressStage stage(silent_progress(), "test");
+    const auto features = extract_features(photos, 500, stage);
+    found.push_back(match_all(features, 15, stage));
+    ASSERT_EQ(found.back().size(), 3u);
+    const PhotoPair& pair = found.back().front();
+    int shifted = 0;
+    for (const Match& m : pair.matches) {
+      const KeyPoint& p = features[0].points[static_cast<size_t>(m.first)];
+      const KeyPoint& q = features[1].points[static_cast<size_t>(m.second)];
+      shifted += std::hypot(p.u_px - q.u_px - 23, p.v_px - q.v_px - 11) < 0.5f ? 1 : 0;
+    }
+    const auto matches = static_cast<int>(pair.matches.size());
+    EXPECT_GT(shifted, matches * 9 / 10) << matches;
+    EXPECT_GT(pair.homography_inliers, matches * 9 / 10);
+  }
+  set_num_threads(2);
+  for (size_t i = 0; i < 3; ++i) {
+    ASSERT_EQ(found[0][i].matches.size(), found[1][i].matches.size());
+    for (size_t k = 0; k < found[0][i].matches.size(); ++k) {
+      EXPECT_EQ(found[0][i].matches[k].first, found[1][i].matches[k].first);
+      EXPECT_EQ(found[0][i].matches[k].second, found[1][i].matches[k].second);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vggtcd

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras and sparse points of photos whose cameras are unknown, by COLMAP, over both epochs at
+// once.
+#pragma once
+
+#include <filesystem>
+
+#include "vggtcd/core/options.h"
+#include "vggtcd/core/progress.h"
+#include "vggtcd/reconstruction/colmap_model.h"
+#include "vggtcd/reconstruction/features.h"
+
+namespace vggtcd {
+
+struct SfmOptions {
+  int max_side_px = 1024;             // photos are reduced to this before key points are looked for
+  int max_features = 4096;            // per photo
+  int min_pair_inliers = 15;          // matches of a pair of photos on one epipolar geometry
+  double init_min_tri_angle_deg = 4;  // COLMAP's 16 finds no first pair in a slow walk
+  int init_min_num_inliers = 40;      // COLMAP's 100 finds none among few photos
+
+  void validate() const;
+};
+
+// The photo with its longer side at most max_side_px.
+Image reduced_photo(const Image& photo, int max_side_px);
+
+// The photos of one job, reduced: both epochs, before first.
+struct SfmPhotos {
+  std::vector<Image> images;
+  int num_before = 0;
+};
+
+struct SfmResult {
+  SfmModel model;                  // in the pixels of the reduced photos
+  std::vector<int> photo_of_view;  // photo number of each view of the model
+  std::vector<PhotoPair> pairs;
+  std::vector<Image> reduced;  // the photos that were given
+};
+
+// Features and matches by features.h, then COLMAP's incremental mapper as a child process with one
+// thread (its results depend on the number of threads), files and log in `scratch`, which is
+// created. Cameras are SIMPLE_RADIAL, one for each epoch and photo size; their focal lengths start
+// at 1.2 and, where that leaves photos out, at 0.85 times the longer side. Chosen is the model with
+// most photos. Throws Error{kUnavailable} without COLMAP; a model without views if none was found.
+SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
+                                const std::filesystem::path& scratch, ProgressSink& progress);
+
+}  // namespace vggtcd
