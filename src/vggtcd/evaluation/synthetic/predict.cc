@@ -168,9 +168,10 @@ class PassSimulator {
   }
 
  private:
-  // 1 + exp(.) like the network's; about 20 where the relative error is 0.1 %, 3 at 10 %.
-  double confidence(double relative_error, double unsure) const {
-    return 1 + std::exp(unsure) * 0.4 / std::pow(relative_error + 2e-3, 0.7);
+  // 1 + exp(.) like the network's. Its training loss c |error| - alpha log c is least where c is
+  // alpha / |error|.
+  static double confidence(double relative_error, double unsure) {
+    return 1 + std::exp(unsure) * 0.05 / (relative_error + 2e-3);
   }
 
   Vector3d warp_m(const Vector3d& x) const {

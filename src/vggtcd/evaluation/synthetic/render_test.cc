@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <set>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/synthetic/random.h"
@@ -254,6 +255,14 @@ TEST(MakeScene, SeedsDiffer) {
     return camera_center(sample_path(scene, Epoch::kT1, 20)[0]);
   };
   EXPECT_GT((first_eye(a) - first_eye(b)).norm(), 1e-3);
+}
+
+TEST(MakeScene, EveryNameAndSeedHasRandomNumbersOfItsOwn) {
+  std::set<uint64_t> keys;
+  for (const std::string_view name : scene_names()) {
+    for (const uint64_t seed : {0, 1, 2, 3}) keys.insert(make_scene(name, seed).key);
+  }
+  EXPECT_EQ(keys.size(), 4 * scene_names().size());
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ uint64_t name_key(std::string_view name) {
 SceneBuilder::SceneBuilder(std::string_view name, uint64_t seed) : random(seed, {name_key(name)}) {
   scene.name = name;
   scene.seed = seed;
+  scene.key = mix64(name_key(name), seed);
 }
 
 Eigen::Vector3f SceneBuilder::varied(const Eigen::Vector3f& color) {
