@@ -8,6 +8,7 @@
 
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/core/error.h"
+#include "vggtcd/evaluation/baselines/rivals.h"
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
 #include "vggtcd/evaluation/wat.h"
@@ -66,6 +67,7 @@ MethodOutcome run_method(const RegistrationMethod& method, const RegistrationPro
 std::vector<MethodOutcome> run_methods(const RegistrationProblem& problem,
                                        const BitemporalTrajectory& truth, bool rivals,
                                        ProgressSink& progress) {
+  if (rivals && rivals_available()) load_rivals();
   std::vector<MethodOutcome> outcomes;
   for (const RegistrationMethod& method : registration_methods()) {
     if (method.rival && !rivals) continue;

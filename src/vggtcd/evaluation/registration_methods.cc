@@ -2,11 +2,9 @@
 // The list of methods.
 #include "vggtcd/evaluation/registration_methods.h"
 
+#include "vggtcd/evaluation/baselines/rivals.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
-#ifdef VGGTCD_WITH_OPEN3D
-#include "vggtcd/evaluation/baselines/open3d_rivals.h"
-#endif
 
 namespace vggtcd {
 namespace {
@@ -19,10 +17,14 @@ Sim3 align_as_paper(const RegistrationProblem& problem) {
   return align_fine(problem.before, problem.after, align_coarse_only(problem), {}).t2_from_t1;
 }
 
-RegistrationMethod rival(std::string name, std::string title,
-                         std::function<Sim3(const RegistrationProblem&)> run) {
-  return {std::move(name), std::move(title), true, std::move(run),
-          "this build has no Open3D (libopen3d-dev)"};
+RegistrationMethod rival(const std::string& name, std::string title) {
+  RegistrationMethod method{name, std::move(title), true, {}, ""};
+  if (rivals_available()) {
+    method.run = [name](const RegistrationProblem& p) { return align_by_rival(name, p); };
+  } else {
+    method.absent_because = "this build has no Open3D plugin (libopen3d-dev)";
+  }
+  return method;
 }
 
 }  // namespace
@@ -31,15 +33,9 @@ std::vector<RegistrationMethod> registration_methods() {
   std::vector<RegistrationMethod> methods;
   methods.push_back({"vggt_only", "VGGT only (identity)", false,
                      [](const RegistrationProblem&) { return Sim3{}; }, ""});
-#ifdef VGGTCD_WITH_OPEN3D
-  methods.push_back(rival("fgr", "FGR", align_fgr));
-  methods.push_back(rival("ransac_icp", "RANSAC+ICP", align_ransac_icp));
-  methods.push_back(rival("scale_icp", "Scale+ICP", align_scale_icp));
-#else
-  methods.push_back(rival("fgr", "FGR", {}));
-  methods.push_back(rival("ransac_icp", "RANSAC+ICP", {}));
-  methods.push_back(rival("scale_icp", "Scale+ICP", {}));
-#endif
+  methods.push_back(rival("fgr", "FGR"));
+  methods.push_back(rival("ransac_icp", "RANSAC+ICP"));
+  methods.push_back(rival("scale_icp", "Scale+ICP"));
   methods.push_back({"geotransformer", "GeoTransformer", true, {}, "not yet"});
   methods.push_back({"coarse", "coarse only", false, align_coarse_only, ""});
   methods.push_back({"paper", "VGGT-CD (paper)", false, align_as_paper, ""});
