@@ -215,7 +215,7 @@ test('numbers show verdict, residuals, plots, times and options', async () => {
   const { page, troubles, close } = await open(browser, file, { colorScheme: 'dark' });
   await page.getByRole('tab', { name: 'Numbers' }).click();
   const text = await page.locator('#pane-numbers').textContent();
-  for (const part of ['Refined: the median residual fell', '× 1.731', '0.0192 u', '0.00710 u', 'max correspondences',
+  for (const part of ['Refined: the median residual fell', '× 1.731', '0.01920 u', '0.007100 u', 'max correspondences',
     'coarse', 'total', 'grid resolution']) {
     assert.ok(text.includes(part), `the numbers say "${part}"`);
   }

@@ -28,7 +28,8 @@ function show(key: string, value: Json): string {
   if (typeof value === 'number') {
     if (/(^|_)seconds$|_s$/.test(key)) return seconds(value);
     if (/bytes$/.test(key)) return bytes(value);
-    const text = Number.isInteger(value) && Math.abs(value) < 1e15 ? count(value) : number(value, 5);
+    const text = Number.isInteger(value) && Math.abs(value) < 1e15 ? count(value)
+      : number(value, 5).replace(/(\.\d*?)0+(e|$)/, '$1$2').replace(/\.(e|$)/, '$1');
     const unit = /_(deg|rad|px|m|u)$/.exec(key)?.[1];
     return unit ? `${text} ${unit === 'deg' ? '°' : unit}` : text;
   }
@@ -77,8 +78,8 @@ function alignment(report: Report): HTMLElement {
   return card('Alignment', h('p', { class: 'sentence' }, verdictSentence(report)),
     h('div', { class: 'figures' },
       scale === null ? null : figure('Scale ratio', `× ${number(scale, 4)}`, 'after ÷ before'),
-      coarse === null ? null : figure('Coarse residual', `${number(coarse)} ${unit}`, ofExtent(coarse)),
-      fine === null ? null : figure('Fine residual', `${number(fine)} ${unit}`, ofExtent(fine)),
+      coarse === null ? null : figure('Coarse residual', `${number(coarse, 4)} ${unit}`, ofExtent(coarse)),
+      fine === null ? null : figure('Fine residual', `${number(fine, 4)} ${unit}`, ofExtent(fine)),
       sigma === null ? null : figure('Robust residual, σ', `${number(sigma)} ${unit}`, ofExtent(sigma)),
       figure('Extent of the scene', `${number(report.scene.extent)} ${unit}`)),
     sim3 ? h('details', {}, h('summary', {}, 'The similarity transform'), table(sim3)) : null);

@@ -42,8 +42,12 @@ const vertexShader = /* glsl */ `
 const fragmentShader = /* glsl */ `
   precision mediump float;
   in vec3 v_color;
+  uniform bool round_points;
   out vec4 color;
-  void main() { color = vec4(v_color, 1.0); }`;
+  void main() {
+    if (round_points && distance(gl_PointCoord, vec2(0.5)) > 0.5) discard;
+    color = vec4(v_color, 1.0);
+  }`;
 
 const rgb = (c: readonly number[]): THREE.Vector3 => new THREE.Vector3(c[0], c[1], c[2]).divideScalar(255);
 
@@ -57,6 +61,7 @@ export interface PointUniforms {
   px_per_unit: { value: number }; // at depth 1
   hide_static: { value: boolean };
   by_label: { value: boolean };
+  round_points: { value: boolean };  // prettier when points are few and large; squares are faster
 }
 
 export function makeUniforms(table: Uint8Array<ArrayBuffer>): PointUniforms {
@@ -65,7 +70,7 @@ export function makeUniforms(table: Uint8Array<ArrayBuffer>): PointUniforms {
   return {
     levels: { value: levels }, mode: { value: 0 }, threshold: { value: 0 }, point_size: { value: 1 },
     min_size: { value: 1 }, px_per_unit: { value: 1 }, hide_static: { value: false },
-    by_label: { value: false },
+    by_label: { value: false }, round_points: { value: false },
   };
 }
 

@@ -25,15 +25,15 @@ export class Viewer {
   private readonly shading = new DepthShading();
   private readonly background = new THREE.Color();
   private layers: PointLayer[] = [];
-  private passes = kPasses;      // of the frames drawn while moving
-  private lastFrameMs = 0;
+  private movingPasses = kPasses;  // how much of the clouds is drawn while the eye moves
+  private lastMovingMs = 0;
   private scheduled = false;
+  private whole = false;           // the frame that is asked for is to be complete
   private settle = 0;
 
   constructor(readonly element: HTMLElement, readonly report: Report, readonly store: Store) {
     THREE.ColorManagement.enabled = false;  // colours are written as they are stored
-    this.renderer = new THREE.WebGLRenderer({ antialias: false, powerPreference: 'high-performance',
-      preserveDrawingBuffer: true });
+    this.renderer = new THREE.WebGLRenderer({ antialias: false, powerPreference: 'high-performance' });
     this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
     this.renderer.autoClear = false;
     const canvas = this.renderer.domElement;
@@ -77,6 +77,7 @@ export class Viewer {
   addClouds(clouds: Cloud[]): void {
     this.layers = clouds.map((cloud) => new PointLayer(cloud, this.uniforms));
     this.scene.add(...this.layers.map((layer) => layer.object));
+    this.uniforms.round_points.value = clouds.reduce((n, cloud) => n + cloud.header.shown, 0) < 400000;
     this.navigation.setHome(clouds);
     this.navigation.home(false);
     this.draw();
@@ -93,32 +94,33 @@ export class Viewer {
 
   // Asks for a frame; moving frames may draw fewer points, the last one never does.
   draw(moving = false): void {
-    if (!moving) this.passes = kPasses;
+    this.whole ||= !moving;
     if (this.scheduled) return;
     this.scheduled = true;
     requestAnimationFrame((now) => {
       this.scheduled = false;
-      if (moving) this.adapt(now);
-      this.render();
+      const whole = this.whole;
+      this.whole = false;
+      if (!whole) this.adapt(now);
+      this.render(whole ? kPasses : this.movingPasses);
     });
   }
 
   // Draws one whole frame now and waits for it: for measuring.
   renderNow(): void {
-    this.passes = kPasses;
-    this.render();
+    this.render(kPasses);
     this.renderer.getContext().readPixels(0, 0, 1, 1, 0x1908, 0x1401, new Uint8Array(4));
   }
 
   private adapt(now: number): void {
-    const interval = now - this.lastFrameMs;
-    this.lastFrameMs = now;
-    if (interval < 400) {  // else the movement has just begun
-      if (interval > 55) this.passes = Math.max(1, this.passes >> 1);
-      else if (interval < 24) this.passes = Math.min(kPasses, this.passes + 1);
-    }
+    const pause = now - this.lastMovingMs;
+    const interval = pause < 1500 ? pause : 0;  // 0: the movement begins
+    this.lastMovingMs = now;
+    if (interval > 55) this.movingPasses = Math.max(1, this.movingPasses >> 1);
+    else if (interval > 0 && interval < 24) this.movingPasses = Math.min(kPasses, this.movingPasses + 1);
+    // When the eye rests, everything; on a slow machine only after longer than a frame takes.
     window.clearTimeout(this.settle);
-    this.settle = window.setTimeout(() => { if (this.passes < kPasses) this.draw(); }, 180);
+    this.settle = window.setTimeout(() => this.draw(), Math.max(180, 2 * interval));
   }
 
   private resize(): void {
@@ -132,7 +134,7 @@ export class Viewer {
     this.draw();
   }
 
-  private render(): void {
+  private render(passes: number): void {
     const { state } = this.store;
     const { camera } = this.navigation;
     const size = this.renderer.getDrawingBufferSize(new THREE.Vector2());
@@ -140,7 +142,7 @@ export class Viewer {
     this.uniforms.px_per_unit.value = size.y / (2 * Math.tan(THREE.MathUtils.degToRad(camera.fov) / 2));
     this.uniforms.min_size.value = Math.max(1, 0.35 * ratio * Math.sqrt(state.pointSize));
     this.navigation.update();
-    for (const layer of this.layers) layer.setPasses(this.passes);
+    for (const layer of this.layers) layer.setPasses(passes);
     this.frustums.object.visible = state.cameras;
     this.frustums.showPicture(!this.navigation.isAtCamera());
 
