@@ -62,12 +62,16 @@ std::array<uint8_t, 3> heat_color(float fraction) {
   return color;
 }
 
+int overlay_zoom(int width) {
+  return std::max(1, (kMinPanelWidth + width - 1) / std::max(1, width));
+}
+
 Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score, int height,
                      int width, const HeatScale& scale) {
   const size_t pixels = static_cast<size_t>(height) * static_cast<size_t>(width);
   check(rgb.size() == 3 * pixels && score.size() == pixels, "render_overlay: sizes");
   check(scale.bound_u > 0, "render_overlay: positive bound");
-  const int zoom = std::max(1, (kMinPanelWidth + width - 1) / width);
+  const int zoom = overlay_zoom(width);
   const int panel_width = zoom * width, panel_height = zoom * height;
   Image out(2 * panel_width + kGap, panel_height + kLegendHeight);
   cv::Mat canvas(out.height, out.width, CV_8UC3, out.rgb.data());

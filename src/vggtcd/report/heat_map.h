@@ -25,4 +25,8 @@ struct HeatScale {
 Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score, int height,
                      int width, const HeatScale& scale);
 
+// Each pixel of a photo of this width is a square of so many pixels in the overlay, the photo's
+// first one in the overlay's top left corner: read_results takes the photo from there.
+int overlay_zoom(int width);
+
 }  // namespace vggtcd

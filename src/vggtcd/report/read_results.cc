@@ -12,6 +12,7 @@
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/ply.h"
+#include "vggtcd/report/heat_map.h"
 
 namespace vggtcd {
 namespace {
@@ -104,18 +105,21 @@ void read_labels(const NpzReader& npz, const std::string& key, ReportEpoch& epoc
   epoch.label = npz.read<uint8_t>(key);
 }
 
-// The left part of an overlay is the photo as it is.
+// The left part of an overlay is the photo, each pixel overlay_zoom() times as large.
 Image read_photo(const fs::path& overlay, int width, int height) {
   if (!fs::exists(overlay)) return {};
   const Image whole = read_image(overlay);
-  if (whole.width < width || whole.height < height) {
+  const int zoom = overlay_zoom(width);
+  if (whole.width < zoom * width || whole.height < zoom * height) {
     throw_error(ErrorCode::kInput,
-                "{}: expected at least {} x {} px, as in change.npz, found {} x {}",
-                overlay.string(), width, height, whole.width, whole.height);
+                "{}: expected at least {} x {} px for the frames of change.npz, found {} x {}",
+                overlay.string(), zoom * width, zoom * height, whole.width, whole.height);
   }
   Image photo(width, height);
   for (int y = 0; y < height; ++y) {
-    std::copy_n(whole.pixel(0, y), 3 * static_cast<size_t>(width), photo.pixel(0, y));
+    for (int x = 0; x < width; ++x) {
+      std::copy_n(whole.pixel(zoom * x, zoom * y), 3, photo.pixel(x, y));
+    }
   }
   return photo;
 }

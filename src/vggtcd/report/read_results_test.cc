@@ -11,6 +11,7 @@
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/ply.h"
+#include "vggtcd/report/heat_map.h"
 
 namespace vggtcd {
 namespace {
@@ -49,10 +50,9 @@ class Results {
     std::filesystem::create_directories(directory / "colmap");
     write_colmap_text(directory / "colmap", views);
     std::filesystem::create_directories(directory / "overlays" / "before");
-    Image overlay(20, 10);
-    for (int y = 0; y < 10; ++y) {
-      for (int x = 0; x < 20; ++x) overlay.pixel(x, y)[0] = static_cast<uint8_t>(10 * y + x);
-    }
+    std::vector<uint8_t> photo(3 * 48);
+    for (size_t i = 0; i < photo.size(); ++i) photo[i] = static_cast<uint8_t>(i);
+    const Image overlay = render_overlay(photo, std::vector<float>(48, 0.02f), 6, 8, {0.05, 0.1});
     write_png(directory / "overlays" / "before" / "a.png", overlay);
   }
   TemporaryDirectory directory;
@@ -83,7 +83,7 @@ TEST(ReadResults, PhotosAreTheLeftPartsOfTheOverlays) {
   const Image photo = input.before.image(1);
   ASSERT_EQ(photo.width, 8);
   ASSERT_EQ(photo.height, 6);
-  EXPECT_EQ(photo.pixel(7, 5)[0], 57);
+  for (size_t i = 0; i < photo.rgb.size(); ++i) EXPECT_EQ(photo.rgb[i], i);
   EXPECT_EQ(input.before.image(0).width, 0);  // it has no overlay
 }
 
