@@ -8,6 +8,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/pipeline/photo_stages.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -21,23 +22,54 @@ double percent(int64_t part, int64_t whole) {
 void add_detect(Program& program) {
   struct Arguments {
     EpochArguments epochs;
+    PhotoInputs photos;
     DetectOptions options;
+    bool dry_run = false;
   };
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = add_command(
-      program, program.app, "detect", "Align two epochs and find what changed between them in 3D.",
-      [arguments](ProgressSink& progress) {
-        const DetectOutcome outcome =
-            detect(arguments->epochs.inputs(), arguments->options, arguments->epochs.out, progress);
-        fmt::print("{}\n", outcome.alignment.explanation);
-        fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
-                   percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
-                   percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
-        fmt::print(
-            "Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
-            arguments->epochs.out);
-      });
+  const auto run = [arguments](ProgressSink& progress) {
+    const EpochArguments& epochs = arguments->epochs;
+    EpochInputs inputs;
+    if (names_photos(epochs.before) || names_photos(epochs.after)) {
+      arguments->options.validate();
+      arguments->photos.before = epochs.before;
+      arguments->photos.after = epochs.after;
+      epochs.require_none();
+      if (arguments->dry_run) {
+        fmt::print("{}", describe_plan(arguments->photos, progress));
+        return;
+      }
+      const ReconstructedPhotos photos =
+          reconstruct_photos(arguments->photos, epochs.out, progress);
+      fmt::print("{}\n", photos.explanation);
+      inputs = photos.inputs;
+    } else {
+      inputs = epochs.inputs();
+    }
+    const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
+    fmt::print("{}\n", outcome.alignment.explanation);
+    fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
+               percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
+               percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
+    fmt::print("Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
+               epochs.out);
+  };
+  CLI::App* command =
+      add_command(program, program.app, "detect",
+                  "Find what changed in 3D between two sets of photos of one place.", run);
   arguments->epochs.add_to(command);
+  command
+      ->add_option("--frames", arguments->photos.frames,
+                   "At most this many photos per epoch, evenly spread; 0 takes all, and 40 of a "
+                   "video (the sharpest of each stretch).")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 10000))
+      ->group("Photos");
+  add_fields(command, arguments->photos.reconstruction, "Photos");
+  command
+      ->add_flag("--dry-run", arguments->dry_run,
+                 "Print the plan (frames, sizes, memory, time) and do nothing. Photos only.")
+      ->group("Photos");
   add_fields(command, arguments->options.alignment, "Alignment");
   add_fields(command, arguments->options.change, "Change");
   add_field(command, "overlays", arguments->options.overlays,
@@ -45,8 +77,15 @@ void add_detect(Program& program) {
   add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");
   add_fields(command, arguments->options.report, "Page");
   command->footer(
-      "Example:\n"
+      "Examples:\n"
+      "  vggt-cd detect before/ after/ -o out\n"
+      "  vggt-cd detect before.mp4 'after/*.jpg' --frames 30 -o out\n"
       "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n\n"
+      "Photos: each side a folder, a pattern or a video. Without network weights they are "
+      "reconstructed "
+      "by COLMAP and\nplane-sweep depth, a fallback that refuses what it cannot place. "
+      "Reconstructions "
+      "are kept in OUT/.stages and used\nagain for the same photos and options.\n\n"
       "Reads the .npz files that VGGT, VGGT-Omega, MapAnything and Depth Anything 3 save. Writes "
       "before_aligned.ply and after.ply\n(scalar fields change_distance, changed, confidence), "
       "overlays/, change.npz, sim3.json, summary.json, cameras_*.tum and\na COLMAP model; "

@@ -13,13 +13,22 @@ void EpochArguments::add_to(CLI::App* command) {
       ->add_option("--joint", joint,
                    "Predictions of the joint pass (.npz): K keyframes of T1, then K of T2, with "
                    "keyframes_t1 and keyframes_t2.")
-      ->group("How the epochs come together (exactly one)");
+      ->group("How the epochs come together (predictions: exactly one)");
   command
       ->add_option("--initial-sim3", initial_sim3,
                    "A sim3.json with scale, rotation and translation: x_T2 = s R x_T1 + t.")
-      ->group("How the epochs come together (exactly one)");
+      ->group("How the epochs come together (predictions: exactly one)");
   command->add_flag("--aligned", aligned, "Both epochs are in one frame and scale already.")
-      ->group("How the epochs come together (exactly one)");
+      ->group("How the epochs come together (predictions: exactly one)");
+}
+
+void EpochArguments::require_none() const {
+  if (joint.empty() && initial_sim3.empty() && !aligned) return;
+  throw_error(
+      ErrorCode::kUsage,
+      "--joint, --initial-sim3 and --aligned are for prediction files, found photos ({}, {}); "
+      "leave the option out",
+      before, after);
 }
 
 EpochInputs EpochArguments::inputs() const {

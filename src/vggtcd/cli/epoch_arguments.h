@@ -17,6 +17,8 @@ struct EpochArguments {
   void add_to(CLI::App* command);
   // Throws Error{kUsage} unless exactly one of --joint, --initial-sim3 and --aligned was given.
   EpochInputs inputs() const;
+  // For photos, which need none of them: throws Error{kUsage} if one was given.
+  void require_none() const;
 };
 
 }  // namespace vggtcd::cli

@@ -95,6 +95,11 @@ void OutputDirectory::commit() {
   check(!committed_, "OutputDirectory: committed twice");
   check_replaceable(target_);  // somebody may have put something there meanwhile
   std::error_code error;
+  for (const std::string& name : kept_) {
+    if (!fs::exists(target_ / name)) continue;
+    fs::rename(target_ / name, aside_ / name, error);
+    if (error) fail(target_, error.message());
+  }
   if (!fs::exists(target_)) {
     fs::rename(aside_, target_, error);
     if (error) fail(target_, error.message());

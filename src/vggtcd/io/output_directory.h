@@ -3,7 +3,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace vggtcd {
 
@@ -27,12 +29,16 @@ class OutputDirectory {
   // path() / name, created.
   std::filesystem::path subdirectory(std::string_view name) const;
 
+  // commit() moves this entry of an earlier target into the new one instead of removing it.
+  void keep(std::string_view name) { kept_.emplace_back(name); }
+
   void commit();
 
  private:
   std::filesystem::path target_;
   std::filesystem::path aside_;
   std::filesystem::path first_created_parent_;  // empty if all parents were there
+  std::vector<std::string> kept_;
   bool committed_ = false;
 };
 

@@ -85,12 +85,14 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress) {
   options.validate();
   OutputDirectory directory(out);
+  directory.keep(".stages");  // photo_stages.h
   StageLog log(progress);
   DetectOutcome outcome;
 
   // 1. Read the epochs and what brings them together.
   Epochs epochs = read_epochs(inputs, options.alignment, log);
   Json summary = summary_head("detect", inputs, epochs);
+  if (!inputs.origin.empty()) summary["reconstruction"] = inputs.origin;
 
   // 2. Align: coarse, fine.
   outcome.alignment = align(epochs.before, epochs.after, epochs.initial, options.alignment, log);

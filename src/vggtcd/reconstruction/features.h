@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sparse correspondences between photos: SIFT key points, their matches, and which of the matches
 // one fundamental matrix explains. Ours rather than COLMAP's because COLMAP matches 300 pairs on a
-// processor in 100 s (these loops: 5 s) and its parallel matcher gives other bytes every time.
+// processor in 100 s (these loops: 5 s at as many features) and its parallel matcher gives other
+// bytes every time.
 #pragma once
 
 #include <cstdint>

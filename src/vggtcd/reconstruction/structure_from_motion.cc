@@ -161,17 +161,20 @@ SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
   SfmResult result;
   result.reduced = std::move(photos.images);
   const std::vector<std::string> names = colmap_names(result.reduced, photos.num_before);
+  std::vector<Features> features;
   {
     ProgressStage stage(progress, "key points");
-    const auto features = extract_features(result.reduced, options.max_features, stage);
-    for (size_t i = 0; i < names.size(); ++i) {
-      write_image(result.reduced[i], scratch / "images" / names[i]);
-      write_features(features[i], scratch / "features" / (names[i] + ".txt"));
-    }
-    ProgressStage matching(progress, "matching");
-    result.pairs = match_all(features, options.min_pair_inliers, matching);
-    write_matches(result.pairs, names, scratch / "matches.txt");
+    features = extract_features(result.reduced, options.max_features, stage);
   }
+  for (size_t i = 0; i < names.size(); ++i) {
+    write_image(result.reduced[i], scratch / "images" / names[i]);
+    write_features(features[i], scratch / "features" / (names[i] + ".txt"));
+  }
+  {
+    ProgressStage stage(progress, "matching");
+    result.pairs = match_all(features, options.min_pair_inliers, stage);
+  }
+  write_matches(result.pairs, names, scratch / "matches.txt");
   ProgressStage stage(progress, "structure from motion");
   constexpr double kEnough = 0.9;
   for (const double focal_factor : {1.2, 0.85}) {

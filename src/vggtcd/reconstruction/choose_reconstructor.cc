@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The list of reconstructors, and which one a user gets.
+#include "vggtcd/reconstruction/choose_reconstructor.h"
+
+#include <cstdlib>
+
+#include "vggtcd/reconstruction/classical_reconstructor.h"
+#include "vggtcd/reconstruction/vggt_reconstructor.h"
+
+namespace vggtcd {
+namespace {
+
+std::string found_weights(const std::string& given) {
+  if (!given.empty()) return given;
+  if (const char* named = std::getenv("VGGTCD_WEIGHTS"); named && *named) return named;
+  const char* home = std::getenv("HOME");
+  const auto usual =
+      std::filesystem::path(home ? home : "") / ".local/share/vggt-cd/model.safetensors";
+  return std::filesystem::exists(usual) ? usual.string() : std::string();
+}
+
+}  // namespace
+
+std::span<const EnumName<ReconstructorKind>> enum_names(ReconstructorKind) {
+  static constexpr EnumName<ReconstructorKind> kNames[] = {
+      {ReconstructorKind::kAuto, "auto"},
+      {ReconstructorKind::kVggt, "vggt"},
+      {ReconstructorKind::kClassical, "classical"}};
+  return kNames;
+}
+
+void ReconstructorOptions::validate() const {
+  check_field(keyframes >= 1, "keyframes", keyframes, "at least 1");
+}
+
+std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,
+                                                    ProgressSink& progress) {
+  options.validate();
+  ReconstructorKind kind = options.reconstructor;
+  const std::string weights =
+      kind == ReconstructorKind::kClassical ? std::string() : found_weights(options.weights);
+  if (kind == ReconstructorKind::kAuto && weights.empty()) {
+    progress.notice(
+        "no network weights (--weights): classical reconstruction, which needs ten or more "
+        "overlapping photos of textured surfaces per epoch");
+    kind = ReconstructorKind::kClassical;
+  }
+  if (kind == ReconstructorKind::kClassical) {
+    ClassicalOptions classical;
+    classical.keyframes = options.keyframes;
+    return std::make_unique<ClassicalReconstructor>(classical);
+  }
+  if (weights.empty()) {
+    throw_error(ErrorCode::kWeights,
+                "no network weights: expected --weights FILE, VGGTCD_WEIGHTS or "
+                "~/.local/share/vggt-cd/model.safetensors; or use --reconstructor classical");
+  }
+  if (!std::filesystem::is_regular_file(weights)) {
+    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file", weights);
+  }
+  VggtReconstructorOptions vggt;
+  vggt.weights = weights;
+  vggt.keyframes = options.keyframes;
+  vggt.network.precision = options.precision;
+  return std::make_unique<VggtReconstructor>(vggt);
+}
+
+}  // namespace vggtcd

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// The list of reconstructors, and which one a user gets.
+#pragma once
+
+#include "vggtcd/reconstruction/reconstructor.h"
+#include "vggtcd/vggt/model.h"
+
+namespace vggtcd {
+
+enum class ReconstructorKind { kAuto, kVggt, kClassical };
+std::span<const EnumName<ReconstructorKind>> enum_names(ReconstructorKind);
+
+struct ReconstructorOptions {
+  ReconstructorKind reconstructor = ReconstructorKind::kAuto;
+  std::string weights;
+  int keyframes = 5;
+  Precision precision = Precision::kAuto;
+
+  static constexpr auto fields = [](auto&& self, auto&& field) {
+    field("reconstructor", self.reconstructor,
+          "vggt: the network. classical: COLMAP and plane-sweep depth, the fallback without "
+          "weights. auto: vggt if weights are given or found, else classical.");
+    field("weights", self.weights,
+          "VGGT's weights, model.safetensors or model.pt. Without it the file named by "
+          "VGGTCD_WEIGHTS, then ~/.local/share/vggt-cd/model.safetensors.");
+    field("keyframes", self.keyframes, "Photos per epoch in the joint reconstruction; at least 1.");
+    field("precision", self.precision,
+          "Of the network: auto takes bf16 where the processor has it.");
+  };
+  void validate() const;
+};
+
+// Throws Error{kWeights} if vggt is asked for and no weights are given or found. In auto,
+// `progress` gets a notice when it is the fallback.
+std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,
+                                                    ProgressSink& progress);
+
+}  // namespace vggtcd
