@@ -135,6 +135,24 @@ class Detect(unittest.TestCase):
         self.assertEqual(np.nanmax(change["score_t1"]), 0)
         self.assertFalse(change["changed_t2"].any())
 
+    def test_votes_give_labels_that_decide(self):
+        out = self.root / "votes"
+        done = run(*self.arguments, "--change-method", "free_space", "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("Not seen by the other epoch", done.stdout)
+        change = np.load(out / "change.npz")
+        truth = np.load(EXAMPLE / "truth.npz")
+        for epoch, code, name in (("t1", 1, "before_aligned"), ("t2", 2, "after")):
+            label, changed = change[f"label_{epoch}"], change[f"changed_{epoch}"]
+            self.assertTrue(set(np.unique(label)) <= {0, code, 3, 255})
+            np.testing.assert_array_equal(changed, label == code)
+            np.testing.assert_array_equal(label == 255, np.isnan(change[f"score_{epoch}"]))
+            ply = read_ply(out / f"{name}.ply")
+            np.testing.assert_array_equal(ply["scalar_label"] == code, ply["scalar_changed"] == 1)
+            # Few alarms: the paper's distance calls most of this surface changed.
+            unseen = truth[f"unseen_by_other_{epoch}"] & (truth[f"changed_{epoch}"] == 0) & (label != 255)
+            self.assertLess(changed[unseen].mean(), 0.1)
+
     def test_initial_sim3_is_read_back(self):
         out = self.root / "given"
         done = run("register", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--initial-sim3", self.out / "sim3.json",

@@ -260,15 +260,6 @@ double extent_of(const Reconstruction& after) {
 
 }  // namespace
 
-std::span<const EnumName<ChangeLabel>> enum_names(ChangeLabel) {
-  static constexpr EnumName<ChangeLabel> kNames[] = {{ChangeLabel::kNoEvidence, "no_evidence"},
-                                                     {ChangeLabel::kUnobserved, "unobserved"},
-                                                     {ChangeLabel::kUnchanged, "unchanged"},
-                                                     {ChangeLabel::kRemoved, "removed"},
-                                                     {ChangeLabel::kAdded, "added"}};
-  return kNames;
-}
-
 void FreeSpaceOptions::validate() const {
   check_field(max_views >= 1, "max_views", max_views, "at least 1");
   check_field(min_confidence_rank >= 0 && min_confidence_rank < 1, "min_confidence_rank",
@@ -322,6 +313,22 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   median_filter(result.t1.label, before, ChangeLabel::kRemoved, options.median_radius_px);
   median_filter(result.t2.label, after, ChangeLabel::kAdded, options.median_radius_px);
   return result;
+}
+
+void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes) {
+  const auto decide = [](std::vector<ChangeLabel> label, EpochChange& epoch) {
+    check(label.size() == epoch.score.size(), "decide_by_labels: the same photos");
+    epoch.changed = 0;
+    epoch.unobserved = 0;
+    for (size_t i = 0; i < label.size(); ++i) {
+      if (std::isnan(epoch.score[i])) label[i] = ChangeLabel::kNoEvidence;
+      epoch.changed += is_change(label[i]) ? 1 : 0;
+      epoch.unobserved += label[i] == ChangeLabel::kUnobserved ? 1 : 0;
+    }
+    epoch.label = std::move(label);
+  };
+  decide(std::move(free_space.t1.label), changes.t1);
+  decide(std::move(free_space.t2.label), changes.t2);
 }
 
 }  // namespace vggtcd

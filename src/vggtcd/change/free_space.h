@@ -9,23 +9,14 @@
 #include <string_view>
 #include <vector>
 
+#include "vggtcd/change/change_label.h"
+#include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
 
 namespace vggtcd {
-
-// The answers. In T1's photos a changed pixel is `removed` (it was there, and is gone), in T2's
-// `added`.
-enum class ChangeLabel : uint8_t {
-  kNoEvidence = 0,  // no depth here, or a confidence too low to say anything
-  kUnobserved = 1,  // no photo of the other epoch could have seen it
-  kUnchanged = 2,
-  kRemoved = 3,
-  kAdded = 4
-};
-std::span<const EnumName<ChangeLabel>> enum_names(ChangeLabel);
 
 struct FreeSpaceOptions {
   int max_views = 12;  // photos of the other epoch asked about a photo; >= 1
@@ -72,6 +63,10 @@ struct FreeSpaceChange {
   double gap_sigma = 0;  // robust sigma of relative gaps (gap / depth) between agreeing surfaces
   double scene_extent_u = 0;  // T2
 };
+
+// Lets the labels decide: moves them into the distance result, where pixels without a score have no
+// evidence, and counts anew.
+void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes);
 
 // Each photo of an epoch asks the photos of the other one that overlap it most. A point X at depth
 // z in the other photo, whose depths in the 3 x 3 pixels around its projection span [lo, hi]:

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "vggtcd/change/change_label.h"
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
@@ -33,8 +34,11 @@ struct EpochChange {
   // [S, H, W]: distance to the other epoch in T2 units; NaN where the pixel has no depth or its
   // confidence is not above the epoch's median: no evidence.
   std::vector<float> score;
-  int64_t points = 0;   // pixels with evidence
-  int64_t changed = 0;  // of them with score > threshold
+  // [S, H, W] or empty. Where present it decides, and the score only says how far.
+  std::vector<ChangeLabel> label;
+  int64_t points = 0;      // pixels with evidence
+  int64_t changed = 0;     // of them called changed
+  int64_t unobserved = 0;  // of them not seen by the other epoch; known with labels only
 };
 
 struct ChangeSet {
@@ -45,6 +49,10 @@ struct ChangeSet {
 
   // Eq. 8 and its threshold: evidence and farther than tau. NaN compares false.
   bool changed(float score) const { return score > static_cast<float>(threshold_u); }
+  // The decision about a pixel of an epoch: by its label if there are labels, else by its score.
+  bool changed(const EpochChange& epoch, size_t pixel) const {
+    return epoch.label.empty() ? changed(epoch.score[pixel]) : is_change(epoch.label[pixel]);
+  }
 };
 
 // Both directions: every point of an epoch (confidence above that epoch's median) against all such

@@ -51,6 +51,11 @@ void add_detect(Program& program) {
     fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
                percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
                percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
+    if (outcome.unobserved_t1 + outcome.unobserved_t2 > 0) {
+      fmt::print("Not seen by the other epoch: {:.1f} % before, {:.1f} % after.\n",
+                 percent(outcome.unobserved_t1, outcome.points_t1),
+                 percent(outcome.unobserved_t2, outcome.points_t2));
+    }
     fmt::print("Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
                epochs.out);
   };
@@ -71,7 +76,14 @@ void add_detect(Program& program) {
                  "Print the plan (frames, sizes, memory, time) and do nothing. Photos only.")
       ->group("Photos");
   add_fields(command, arguments->options.alignment, "Alignment");
+  add_field(command, "change_method", arguments->options.change_method,
+            "distance: changed is what is far from the other epoch's points, the paper's rule. "
+            "free_space: changed is what the photos of the other epoch look through; what none of "
+            "them sees is unobserved. auto: free_space with --method robust and for photos without "
+            "a network, else distance.");
+  command->get_option("--change-method")->group("Change");
   add_fields(command, arguments->options.change, "Change");
+  add_fields(command, arguments->options.free_space, "Change");
   add_field(command, "overlays", arguments->options.overlays,
             "Write overlays/: each photo beside its heat map.");
   add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");

@@ -73,7 +73,21 @@ Json summary_head(const char* command, const EpochInputs& inputs, const Epochs& 
           {"inputs", inputs_json(inputs, epochs)}};
 }
 
+bool by_free_space(const EpochInputs& inputs, const DetectOptions& options) {
+  if (options.change_method != ChangeMethod::kAuto) {
+    return options.change_method == ChangeMethod::kFreeSpace;
+  }
+  return inputs.has_holes || options.alignment.method == AlignmentMethod::kRobust;
+}
+
 }  // namespace
+
+std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
+  static constexpr EnumName<ChangeMethod> kNames[] = {{ChangeMethod::kAuto, "auto"},
+                                                      {ChangeMethod::kDistance, "distance"},
+                                                      {ChangeMethod::kFreeSpace, "free_space"}};
+  return kNames;
+}
 
 void DetectOptions::validate() const {
   alignment.validate();
@@ -104,10 +118,18 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   log.run("change detection", [&](ProgressStage&) {
     changes = detect_changes(epochs.before, epochs.after, t2_from_t1, options.change);
   });
+  if (by_free_space(inputs, options)) {
+    log.run("free-space votes", [&](ProgressStage&) {
+      decide_by_labels(
+          free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space), changes);
+    });
+  }
   outcome.points_t1 = changes.t1.points;
   outcome.changed_t1 = changes.t1.changed;
   outcome.points_t2 = changes.t2.points;
   outcome.changed_t2 = changes.t2.changed;
+  outcome.unobserved_t1 = changes.t1.unobserved;
+  outcome.unobserved_t2 = changes.t2.unobserved;
 
   // 4. Write.
   const std::filesystem::path& aside = directory.path();

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "vggtcd/change/free_space.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/pipeline/alignment.h"
 #include "vggtcd/report/report_page.h"
@@ -18,19 +19,36 @@ struct EpochInputs {
   std::optional<std::filesystem::path> joint;         // the joint pass over keyframes of both
   std::optional<std::filesystem::path> initial_sim3;  // a sim3.json: t2_from_t1
   bool aligned = false;                               // both epochs are in one frame already
-  std::string origin;  // a sentence for the summary: how the files were made, if we made them
+  std::string origin;      // a sentence for the summary: how the files were made, if we made them
+  bool has_holes = false;  // depth is missing where it was hard to find: a hole says nothing
 };
+
+enum class ChangeMethod {
+  kAuto,       // votes with method robust and for reconstructions with holes, else distance
+  kDistance,   // the paper's nearest-neighbour distance
+  kFreeSpace,  // votes of the photos that should see a point
+};
+std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod);
 
 struct DetectOptions {
   AlignmentOptions alignment;
+  ChangeMethod change_method = ChangeMethod::kAuto;
   ChangeOptions change;
+  FreeSpaceOptions free_space;
   bool overlays = true;
   bool page = true;
   ReportOptions report;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("alignment", self.alignment, "");
+    field("change_method", self.change_method,
+          "distance: changed is what is far from the other epoch's points, the paper's rule. "
+          "free_space: "
+          "changed is what the photos of the other epoch look through; what none of them sees is "
+          "unobserved. "
+          "auto: free_space with --method robust and for photos without a network, else distance.");
     field("change", self.change, "");
+    field("free_space", self.free_space, "");
     field("overlays", self.overlays, "Write overlays/: each photo beside its heat map.");
     field("page", self.page, "Write report.html: everything in one page.");
     field("report", self.report, "");
@@ -45,6 +63,7 @@ struct DetectOutcome {
   Alignment alignment;
   int64_t points_t1 = 0, changed_t1 = 0;
   int64_t points_t2 = 0, changed_t2 = 0;
+  int64_t unobserved_t1 = 0, unobserved_t2 = 0;  // of the points; known with free-space votes only
 };
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress);

@@ -121,6 +121,7 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path
                                  (kept / "reconstruction.json").string())
                          .get<std::string>();
   done.inputs.origin = done.explanation;
+  done.inputs.has_holes = reconstructor->leaves_holes();
   return done;
 }
 

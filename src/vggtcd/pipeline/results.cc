@@ -2,7 +2,9 @@
 // The files that detect and register leave behind; docs/formats.md describes each one.
 #include "vggtcd/pipeline/results.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/io/colmap.h"
@@ -73,6 +75,8 @@ Json robust_json(const RobustResult& robust) {
 Json epoch_change_json(const EpochChange& change) {
   return {{"points", change.points},
           {"changed", change.changed},
+          {"decided_by", change.label.empty() ? "distance" : "free_space"},
+          {"unobserved", change.unobserved},
           {"changed_share", change.points > 0 ? static_cast<double>(change.changed) /
                                                     static_cast<double>(change.points)
                                               : 0.0}};
@@ -80,8 +84,38 @@ Json epoch_change_json(const EpochChange& change) {
 
 std::vector<uint8_t> changed_mask(const EpochChange& change, const ChangeSet& changes) {
   std::vector<uint8_t> mask(change.score.size());
-  for (size_t i = 0; i < mask.size(); ++i) mask[i] = changes.changed(change.score[i]) ? 1 : 0;
+  for (size_t i = 0; i < mask.size(); ++i) mask[i] = changes.changed(change, i) ? 1 : 0;
   return mask;
+}
+
+std::vector<uint8_t> label_codes(const EpochChange& change) {
+  std::vector<uint8_t> codes;
+  codes.reserve(change.label.size());
+  for (const ChangeLabel label : change.label) codes.push_back(static_cast<uint8_t>(label));
+  return codes;
+}
+
+// What the heat map shows: the distance, kept on the side of the threshold that the label decides;
+// grey where nothing was observed.
+std::vector<float> shown_scores(const EpochChange& change, size_t first, size_t count,
+                                float threshold) {
+  const auto begin = change.score.begin() + static_cast<int64_t>(first);
+  std::vector<float> shown(begin, begin + static_cast<int64_t>(count));
+  if (change.label.empty()) return shown;
+  for (size_t i = 0; i < count; ++i) {
+    switch (change.label[first + i]) {
+      case ChangeLabel::kUnchanged:
+        shown[i] = std::min(shown[i], threshold);
+        break;
+      case ChangeLabel::kRemoved:
+      case ChangeLabel::kAdded:
+        shown[i] = std::max(shown[i], 2 * threshold);
+        break;
+      default:
+        shown[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  return shown;
 }
 
 Trajectory trajectory_of(const std::vector<View>& views) {
@@ -147,8 +181,10 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
                       const Sim3& t2_from_epoch, const EpochChange& change,
                       const ChangeSet& changes) {
   const std::string comments[] = {"frame: T2, model units"};
-  PlyWriter writer(path, static_cast<size_t>(change.points),
-                   {"change_distance", "changed", "confidence"}, comments);
+  std::vector<std::string> fields = {"change_distance", "changed", "confidence"};
+  if (!change.label.empty()) fields.push_back("label");
+  const size_t num_fields = fields.size();
+  PlyWriter writer(path, static_cast<size_t>(change.points), std::move(fields), comments);
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
     const PixelRays rays(epoch.views[static_cast<size_t>(frame)], t2_from_epoch);
     size_t pixel = static_cast<size_t>(frame) * epoch.pixels_per_frame();
@@ -156,9 +192,11 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
       for (int u = 0; u < epoch.width; ++u, ++pixel) {
         const float score = change.score[pixel];
         if (std::isnan(score)) continue;
-        const float values[] = {score, changes.changed(score) ? 1.0f : 0.0f,
-                                epoch.confidence[pixel]};
-        writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel], values);
+        const float values[] = {
+            score, changes.changed(change, pixel) ? 1.0f : 0.0f, epoch.confidence[pixel],
+            change.label.empty() ? 0.0f : static_cast<float>(change.label[pixel])};
+        writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel],
+                   std::span(values).first(num_fields));
       }
     }
   }
@@ -177,6 +215,13 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
   writer.add<float>("score_t2", shape(after), changes.t2.score);
   writer.add_mask("changed_t1", shape(before), mask_t1);
   writer.add_mask("changed_t2", shape(after), mask_t2);
+  std::vector<uint8_t> label_t1, label_t2;
+  if (!changes.t1.label.empty()) {
+    label_t1 = label_codes(changes.t1);
+    label_t2 = label_codes(changes.t2);
+    writer.add<uint8_t>("label_t1", shape(before), label_t1);
+    writer.add<uint8_t>("label_t2", shape(after), label_t2);
+  }
   writer.finish();
 }
 
@@ -186,10 +231,10 @@ void write_overlays(const std::filesystem::path& directory, const Reconstruction
   const size_t per_frame = epoch.pixels_per_frame();
   parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
     const size_t index = static_cast<size_t>(frame);
-    const Image overlay =
-        render_overlay(epoch.frame_color(static_cast<int>(frame)),
-                       std::span(change.score).subspan(index * per_frame, per_frame), epoch.height,
-                       epoch.width, {changes.threshold_u, changes.bound_u});
+    const Image overlay = render_overlay(
+        epoch.frame_color(static_cast<int>(frame)),
+        shown_scores(change, index * per_frame, per_frame, static_cast<float>(changes.threshold_u)),
+        epoch.height, epoch.width, {changes.threshold_u, changes.bound_u});
     const std::string stem = std::filesystem::path(epoch.views[index].name).stem().string();
     write_png(directory / (stem + ".png"), overlay);
   });

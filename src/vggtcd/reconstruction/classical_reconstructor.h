@@ -26,6 +26,7 @@ class ClassicalReconstructor : public Reconstructor {
  public:
   explicit ClassicalReconstructor(const ClassicalOptions& options) : options_(options) {}
   std::string name() const override { return "classical"; }
+  bool leaves_holes() const override { return true; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
   EpochReconstructions reconstruct(const PhotoEpochs& photos, const std::filesystem::path& scratch,

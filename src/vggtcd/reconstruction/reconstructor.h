@@ -39,7 +39,9 @@ struct EpochReconstructions {
 class Reconstructor {
  public:
   virtual ~Reconstructor() = default;
-  virtual std::string name() const = 0;         // "vggt", "classical"
+  virtual std::string name() const = 0;  // "vggt", "classical"
+  // Whether depth is missing where it was hard to find; a hole is unknown, never changed.
+  virtual bool leaves_holes() const = 0;
   virtual std::string fingerprint() const = 0;  // all that its result depends on besides the photos
   virtual ReconstructionPlan plan(const PhotoEpochs& photos) const = 0;
   // `scratch` is a folder of its own for working files. Same photos and fingerprint, same result.

@@ -19,6 +19,7 @@ class VggtReconstructor : public Reconstructor {
  public:
   explicit VggtReconstructor(VggtReconstructorOptions options) : options_(std::move(options)) {}
   std::string name() const override { return "vggt"; }
+  bool leaves_holes() const override { return false; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
   EpochReconstructions reconstruct(const PhotoEpochs& photos, const std::filesystem::path& scratch,
