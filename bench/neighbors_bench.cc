@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <nanoflann.hpp>
@@ -39,23 +40,44 @@ void write(const std::filesystem::path& path, const std::vector<T>& values) {
   if (!file) throw_error(ErrorCode::kOutput, "{}: cannot be written", path.string());
 }
 
+// Wall-clock and processor seconds; the second hardly depends on what else the machine is doing.
+struct Cost {
+  double wall_s = 0, cpu_s = 0;
+};
+
+class Stopwatch {
+ public:
+  Cost cost() const { return {timer_.seconds(), cpu_seconds() - cpu_started_s_}; }
+
+ private:
+  static double cpu_seconds() {
+    return static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
+  }
+  Timer timer_;
+  double cpu_started_s_ = cpu_seconds();
+};
+
+void to_json(nlohmann::json& json, const Cost& cost) {
+  json = {{"wall_s", cost.wall_s}, {"cpu_s", cost.cpu_s}};
+}
+
 struct Directions {
   std::vector<float> distance_t1, distance_t2;  // T1 -> T2, T2 -> T1
-  double build_s = 0, query_s = 0;
-  double seconds() const { return build_s + query_s; }
+  Cost build, query;
+  double cpu_s() const { return build.cpu_s + query.cpu_s; }
 };
 
 Directions ours(const Points& t1, const Points& t2, float bound) {
   Directions result;
   result.distance_t1.resize(t1.size());
   result.distance_t2.resize(t2.size());
-  const Timer build;
+  const Stopwatch build;
   const NearestNeighborIndex index_t1(t1), index_t2(t2);
-  result.build_s = build.seconds();
-  const Timer query;
+  result.build = build.cost();
+  const Stopwatch query;
   index_t2.query(index_t1, bound, result.distance_t1);
   index_t1.query(index_t2, bound, result.distance_t2);
-  result.query_s = query.seconds();
+  result.query = query.cost();
   return result;
 }
 
@@ -106,16 +128,16 @@ Directions with_nanoflann(const Points& t1, const Points& t2, float bound, size_
   Directions result;
   const NanoflannCloud cloud_t1{t1}, cloud_t2{t2};
   const nanoflann::KDTreeSingleIndexAdaptorParams params(leaf_size);
-  const Timer build;
+  const Stopwatch build;
   std::unique_ptr<NanoflannTree> tree_t1, tree_t2;
   std::thread other([&] { tree_t1 = std::make_unique<NanoflannTree>(3, cloud_t1, params); });
   tree_t2 = std::make_unique<NanoflannTree>(3, cloud_t2, params);
   other.join();
-  result.build_s = build.seconds();
-  const Timer query;
+  result.build = build.cost();
+  const Stopwatch query;
   query_nanoflann(*tree_t2, t1, bound, result.distance_t1);
   query_nanoflann(*tree_t1, t2, bound, result.distance_t2);
-  result.query_s = query.seconds();
+  result.query = query.cost();
   return result;
 }
 
@@ -184,15 +206,15 @@ int run(int argc, char** argv) {
   report["bound"] = bound;
 
   const Directions first = ours(t1, t2, bound), second = ours(t1, t2, bound);
-  const Directions& mine = first.seconds() < second.seconds() ? first : second;
-  report["ours"] = {{"build_s", mine.build_s}, {"query_s", mine.query_s}};
+  const Directions& mine = first.cpu_s() < second.cpu_s() ? first : second;
+  report["ours"] = {{"build", mine.build}, {"query", mine.query}};
   Directions peer;
   for (const size_t leaf_size : {10, 16, 32}) {
     Directions tried = with_nanoflann(t1, t2, bound, leaf_size);
-    if (peer.distance_t1.empty() || tried.seconds() < peer.seconds()) {
+    if (peer.distance_t1.empty() || tried.cpu_s() < peer.cpu_s()) {
       peer = std::move(tried);
       report["nanoflann"] = {
-          {"build_s", peer.build_s}, {"query_s", peer.query_s}, {"leaf_size", leaf_size}};
+          {"build", peer.build}, {"query", peer.query}, {"leaf_size", leaf_size}};
     }
   }
   report["differ_from_nanoflann"] = count_different(mine.distance_t1, peer.distance_t1) +
@@ -202,15 +224,15 @@ int run(int argc, char** argv) {
   report["beyond_bound"] = std::count(mine.distance_t1.begin(), mine.distance_t1.end(), bound) +
                            std::count(mine.distance_t2.begin(), mine.distance_t2.end(), bound);
 
-  double fine_s = std::numeric_limits<double>::max();
+  Cost fine_cost{0, std::numeric_limits<double>::max()};
   FineResult fine;
   for (int repeat = 0; repeat < 3; ++repeat) {
-    const Timer timer;
+    const Stopwatch stopwatch;
     fine = align_fine(scene.before, scene.after, aligned, FineOptions{});
-    fine_s = std::min(fine_s, timer.seconds());
+    if (const Cost cost = stopwatch.cost(); cost.cpu_s < fine_cost.cpu_s) fine_cost = cost;
   }
   const Eigen::Vector3d& t = fine.t2_from_t1.translation;
-  report["fine"] = {{"seconds", fine_s},
+  report["fine"] = {{"cost", fine_cost},
                     {"points", {fine.points_t1, fine.points_t2}},
                     {"static_points", fine.static_points},
                     {"translation", {t.x(), t.y(), t.z()}}};

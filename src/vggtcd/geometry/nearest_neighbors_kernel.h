@@ -16,6 +16,7 @@ namespace vggtcd {
 namespace {
 
 constexpr int32_t kNoBlock = -1;
+constexpr int kNoChild = -1;
 constexpr int32_t kLowestIndexNotYetKnown = INT32_MAX;
 constexpr float kLargestFloat = 3.402823466e+38f;
 
@@ -32,10 +33,11 @@ class PacketSearch {
     int32_t seed = kNoBlock;
     for (int64_t packet = 0; packet < query_.num_blocks; ++packet) {
       start(query_.blocks[packet]);
-      // Where the previous packet ended is a good guess, and a good guess prunes most of the tree.
-      seed_ = seed;
-      if (seed != kNoBlock) visit_block(seed);
-      visit_node(tree_.num_levels - 1, 0);
+      if (seed == kNoBlock) {
+        visit_node(tree_.num_levels - 1, 0, kNoChild);
+      } else {
+        search_outward(seed);
+      }
       finish();
       if (best_block_[kNearestNeighborLanes - 1] != kNoBlock) {
         seed = best_block_[kNearestNeighborLanes - 1];
@@ -44,6 +46,18 @@ class PacketSearch {
   }
 
  private:
+  // From a block that is likely near, up to the root, each time into what has not been visited: the
+  // sooner the best are good, the less of the tree matters.
+  void search_outward(int32_t block) {
+    visit_block(block);
+    int64_t number = block;
+    for (int level = 0; level < tree_.num_levels; ++level) {
+      const int visited = static_cast<int>(number % kNearestNeighborLanes);
+      number /= kNearestNeighborLanes;
+      visit_node(level, number, visited);
+    }
+  }
+
   static V squared_length(V dx, V dy, V dz) { return (dx * dx + dy * dy) + dz * dz; }
 
   void start(const PointBlock& queries) {
@@ -88,46 +102,44 @@ class PacketSearch {
     return squared_length(outside(x_, 0), outside(y_, 1), outside(z_, 2));
   }
 
-  // The nearest child first; it usually settles most of the others.
-  void visit_node(int level, int64_t number) {
-    if (level == 0) {
-      visit_blocks_of(number);
-      return;
-    }
-    const auto visit = [&](int child) {
-      visit_node(level - 1, number * kNearestNeighborLanes + child);
-    };
+  // Visits the children of a node that matter, but for one.
+  void visit_node(int level, int64_t number, int except_child) {
     const BoxNode& node = tree_.levels[level][number];
     const V distances = box_to_boxes(node);
     uint32_t pending = V::bits(less_equal(distances, V::all(worst_)));
+    if (except_child != kNoChild) pending &= ~(1u << except_child);
     if (pending == 0) return;
-    alignas(64) float distance[kNearestNeighborLanes];
-    distances.store(distance);
-    if ((pending & (pending - 1)) != 0) {
-      const V nearest = V::all(min_of(distances));
-      const int child = __builtin_ctz(V::bits(equal(distances, nearest)));
-      pending &= ~(1u << child);
-      if (matters(distance[child], node.min_index[child])) visit(child);
-    }
-    for (; pending != 0; pending &= pending - 1) {
-      const int child = __builtin_ctz(pending);
-      if (matters(distance[child], node.min_index[child])) visit(child);
+    if (level == 0) {
+      visit_blocks(node, static_cast<int32_t>(number * kNearestNeighborLanes), distances, pending);
+    } else {
+      visit_nodes(level - 1, node, number * kNearestNeighborLanes, distances, pending);
     }
   }
 
-  // The blocks of a node of the lowest level.
-  void visit_blocks_of(int64_t number) {
-    const BoxNode& node = tree_.levels[0][number];
-    const V distances = box_to_boxes(node);
-    uint32_t pending = V::bits(less_equal(distances, V::all(worst_)));
-    const int64_t first = number * kNearestNeighborLanes;
-    if (seed_ >= first && seed_ < first + kNearestNeighborLanes)
-      pending &= ~(1u << (seed_ - first));
+  // The nearest of the pending children first; it usually settles most of the others.
+  void visit_nodes(int level, const BoxNode& parent, int64_t first, V distances, uint32_t pending) {
+    alignas(64) float distance[kNearestNeighborLanes];
+    distances.store(distance);
+    const auto visit = [&](int child) {
+      if (matters(distance[child], parent.min_index[child])) {
+        visit_node(level, first + child, kNoChild);
+      }
+    };
+    const V nearest = V::all(min_of(distances));
+    if (const uint32_t at_nearest = V::bits(equal(distances, nearest)) & pending; at_nearest != 0) {
+      const int child = __builtin_ctz(at_nearest);
+      pending &= ~(1u << child);
+      visit(child);
+    }
+    for (; pending != 0; pending &= pending - 1) visit(__builtin_ctz(pending));
+  }
+
+  void visit_blocks(const BoxNode& parent, int32_t first, V distances, uint32_t pending) {
     while (pending != 0) {
       const int child = __builtin_ctz(pending);
       pending &= pending - 1;
-      if (V::bits(less_equal(queries_to_box(node, child), best_)) == 0) continue;
-      visit_block(static_cast<int32_t>(first + child));
+      if (V::bits(less_equal(queries_to_box(parent, child), best_)) == 0) continue;
+      visit_block(first + child);
       pending &= V::bits(less_equal(distances, V::all(worst_)));
     }
   }
@@ -216,7 +228,6 @@ class PacketSearch {
   alignas(64) int32_t best_index_[kNearestNeighborLanes];
   float worst_;          // the largest in best_
   int32_t worst_index_;  // a box of equal distance matters if it holds an index below this
-  int32_t seed_ = kNoBlock;
 };
 
 }  // namespace

@@ -4,11 +4,14 @@
 #include "vggtcd/geometry/voxel_grid.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/large_array.h"
 #include "vggtcd/core/parallel.h"
 
 namespace vggtcd {
@@ -29,95 +32,101 @@ uint32_t index_of(uint64_t rank) {
   return std::numeric_limits<uint32_t>::max() - static_cast<uint32_t>(rank);
 }
 
-// Voxel -> highest rank, by open addressing with linear probing, at most half full.
+// What a table holds of a voxel: the rank of its best point. 0: free slot.
+struct Slot {
+  Voxel voxel;
+  uint64_t rank;
+};
+
+// Voxel -> highest rank, by open addressing with linear probing, at most three quarters full.
 class VoxelTable {
  public:
-  struct Slot {
-    Voxel voxel;
-    uint64_t rank;  // 0: free
-  };
+  VoxelTable() : slots_(zeroed(1 << 10)) {}
 
-  VoxelTable() : slots_(1024) {}
-
-  // The rank of this voxel, 0 if it is new, to be raised by the caller. Valid until the next call.
-  uint64_t& operator[](const Voxel& voxel) {
-    if (2 * used_ >= slots_.size()) grow();
-    Slot& slot = find(voxel);
-    if (slot.rank == 0) {
-      slot.voxel = voxel;
-      ++used_;
-    }
-    return slot.rank;
-  }
-
-  template <typename F>
-  void for_each(F&& visit) const {
-    for (const Slot& slot : slots_) {
-      if (slot.rank != 0) visit(slot.voxel, slot.rank);
+  // Enters voxels. The table is larger than the caches and its slots are looked up all over the
+  // place, so their cache lines are asked for together, not one after the other.
+  void raise(std::span<const Slot> entries) {
+    for (const Slot& entry : entries) __builtin_prefetch(&slots_[first_slot(entry.voxel)]);
+    for (const Slot& entry : entries) {
+      if (4 * used_ >= 3 * slots_.size()) grow();
+      Slot& slot = find(entry.voxel);
+      if (slot.rank == 0) {
+        slot = entry;
+        ++used_;
+      } else {
+        slot.rank = std::max(slot.rank, entry.rank);
+      }
     }
   }
+
+  std::span<const Slot> slots() const { return slots_; }
 
  private:
-  static size_t hash(const Voxel& voxel) {
-    // Odd constants spread each coordinate over the word; the upper half of the product is well
-    // mixed.
+  static LargeArray<Slot> zeroed(size_t size) {
+    LargeArray<Slot> slots(size);
+    std::ranges::fill(slots, Slot{});
+    return slots;
+  }
+  size_t first_slot(const Voxel& voxel) const {
+    // Odd constants spread each coordinate over the word; the product's upper half is well mixed.
     uint64_t bits = static_cast<uint32_t>(voxel.x) * 0x9E3779B97F4A7C15u;
     bits ^= static_cast<uint32_t>(voxel.y) * 0xC2B2AE3D27D4EB4Fu;
     bits ^= static_cast<uint32_t>(voxel.z) * 0x165667B19E3779F9u;
-    return static_cast<size_t>((bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u >> 32);
+    bits = (bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u;
+    return static_cast<size_t>(bits >> 32) & (slots_.size() - 1);
   }
   Slot& find(const Voxel& voxel) {
-    const size_t mask = slots_.size() - 1;
-    size_t i = hash(voxel) & mask;
-    while (slots_[i].rank != 0 && slots_[i].voxel != voxel) i = (i + 1) & mask;
+    size_t i = first_slot(voxel);
+    while (slots_[i].rank != 0 && slots_[i].voxel != voxel) i = (i + 1) & (slots_.size() - 1);
     return slots_[i];
   }
   void grow() {
-    std::vector<Slot> old(2 * slots_.size());
-    old.swap(slots_);
+    const LargeArray<Slot> old = std::exchange(slots_, zeroed(2 * slots_.size()));
     for (const Slot& slot : old) {
       if (slot.rank != 0) find(slot.voxel) = slot;
     }
   }
 
-  std::vector<Slot> slots_;  // a power of two
+  LargeArray<Slot> slots_;  // a power of two
   size_t used_ = 0;
 };
 
-int32_t voxel_number(float coordinate, double voxel_size) {
-  const double number = std::floor(static_cast<double>(coordinate) / voxel_size);
-  if (!(std::abs(number) < 2147483648.0)) {
-    throw_error(ErrorCode::kDegenerate,
-                "voxel grid: expected a voxel size above 2^-31 of the coordinates, found {} for "
-                "coordinate {}; choose a coarser grid",
-                voxel_size, coordinate);
-  }
-  return static_cast<int32_t>(number);
+[[noreturn]] void throw_too_fine(float coordinate, double voxel_size) {
+  throw_error(ErrorCode::kDegenerate,
+              "voxel grid: expected a voxel size above 2^-31 of the coordinates, found {} for "
+              "coordinate {}; choose a coarser grid",
+              voxel_size, coordinate);
 }
 
-// Enters points begin..end. Pixels next to one another mostly share a voxel: it is looked up once
-// for the run.
+// floor(coordinate / voxel_size); std::floor is a function call on plain x86-64.
+inline int32_t voxel_number(float coordinate, double voxel_size) {
+  const double number = static_cast<double>(coordinate) / voxel_size;
+  if (!(number < 2147483648.0 && number >= -2147483648.0)) throw_too_fine(coordinate, voxel_size);
+  const auto truncated = static_cast<int32_t>(number);
+  return truncated - (static_cast<double>(truncated) > number ? 1 : 0);
+}
+
+// Enters points begin..end. Pixels next to one another often share a voxel and are entered as one.
 void enter(std::span<const Eigen::Vector3f> positions, std::span<const float> confidence,
            double voxel_size, size_t begin, size_t end, VoxelTable& table) {
-  const auto voxel_of = [&](const Eigen::Vector3f& x) {
-    return Voxel{voxel_number(x.x(), voxel_size), voxel_number(x.y(), voxel_size),
-                 voxel_number(x.z(), voxel_size)};
-  };
-  Voxel voxel = voxel_of(positions[begin]);
-  uint64_t best = 0;
-  const auto enter_run = [&] {
-    uint64_t& rank = table[voxel];
-    rank = std::max(rank, best);
-  };
+  std::array<Slot, 64> runs;
+  size_t num_runs = 0;
   for (size_t i = begin; i < end; ++i) {
-    if (const Voxel next = voxel_of(positions[i]); next != voxel) {
-      enter_run();
-      voxel = next;
-      best = 0;
+    const Eigen::Vector3f& x = positions[i];
+    const Voxel voxel{voxel_number(x.x(), voxel_size), voxel_number(x.y(), voxel_size),
+                      voxel_number(x.z(), voxel_size)};
+    const uint64_t rank = rank_of(confidence[i], static_cast<uint32_t>(i));
+    if (num_runs > 0 && runs[num_runs - 1].voxel == voxel) {
+      runs[num_runs - 1].rank = std::max(runs[num_runs - 1].rank, rank);
+      continue;
     }
-    best = std::max(best, rank_of(confidence[i], static_cast<uint32_t>(i)));
+    if (num_runs == runs.size()) {
+      table.raise(runs);
+      num_runs = 0;
+    }
+    runs[num_runs++] = {voxel, rank};
   }
-  enter_run();
+  table.raise(std::span(runs).first(num_runs));
 }
 
 }  // namespace
@@ -134,14 +143,19 @@ std::vector<uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> position
                                static_cast<size_t>(end), tables[static_cast<size_t>(worker)]);
                        });
   for (size_t worker = 1; worker < tables.size(); ++worker) {
-    tables[worker].for_each([&](const Voxel& voxel, uint64_t other) {
-      uint64_t& rank = tables[0][voxel];
-      rank = std::max(rank, other);
-    });
+    for (const Slot& slot : tables[worker].slots()) {
+      if (slot.rank != 0) tables[0].raise({&slot, 1});
+    }
+  }
+  // In ascending order without sorting: mark, then collect.
+  std::vector<uint8_t> is_kept(positions.size(), 0);
+  for (const Slot& slot : tables[0].slots()) {
+    if (slot.rank != 0) is_kept[index_of(slot.rank)] = 1;
   }
   std::vector<uint32_t> kept;
-  tables[0].for_each([&](const Voxel&, uint64_t rank) { kept.push_back(index_of(rank)); });
-  std::sort(kept.begin(), kept.end());
+  for (size_t i = 0; i < is_kept.size(); ++i) {
+    if (is_kept[i] != 0) kept.push_back(static_cast<uint32_t>(i));
+  }
   return kept;
 }
 

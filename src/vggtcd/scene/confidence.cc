@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "vggtcd/core/error.h"
@@ -12,20 +13,39 @@
 
 namespace vggtcd {
 
-float confidence_threshold(const Reconstruction& reconstruction) {
-  std::vector<float> values;
-  values.reserve(reconstruction.num_pixels());
-  for (size_t i = 0; i < reconstruction.num_pixels(); ++i) {
-    if (reconstruction.depth[i] > 0) values.push_back(reconstruction.confidence[i]);
+namespace {
+
+// The confidences of the pixels that have depth; copied only if some pixel has none.
+class ConfidencesWithDepth {
+ public:
+  explicit ConfidencesWithDepth(const Reconstruction& r) : values_(r.confidence) {
+    if (std::ranges::all_of(r.depth, [](float depth) { return depth > 0; })) return;
+    copy_.reserve(r.num_pixels());
+    for (size_t i = 0; i < r.num_pixels(); ++i) {
+      if (r.depth[i] > 0) copy_.push_back(r.confidence[i]);
+    }
+    values_ = copy_;
   }
+  std::span<const float> values() const { return values_; }
+
+ private:
+  std::vector<float> copy_;
+  std::span<const float> values_;
+};
+
+}  // namespace
+
+float confidence_threshold(const Reconstruction& reconstruction) {
+  const ConfidencesWithDepth with_depth(reconstruction);
+  const std::span<const float> values = with_depth.values();
   if (values.empty()) {
     throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
                 reconstruction.num_frames());
   }
-  const float threshold = static_cast<float>(median(values));
-  const float largest = *std::max_element(values.begin(), values.end());
-  if (threshold < largest) return threshold;
-  return std::nextafter(largest, -std::numeric_limits<float>::infinity());
+  const float threshold = median(values);
+  // Normally found among the first few.
+  if (std::ranges::any_of(values, [&](float value) { return value > threshold; })) return threshold;
+  return std::nextafter(threshold, -std::numeric_limits<float>::infinity());
 }
 
 }  // namespace vggtcd
