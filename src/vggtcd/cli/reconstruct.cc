@@ -84,11 +84,11 @@ void add_reconstruct(Program& program) {
   command->footer(
       "Example:\n"
       "  vggt-cd reconstruct before/ -o t1.npz --weights model.safetensors\n\n"
-      "The first photo's camera is the origin; the scale is the network's own. The file has "
-      "VGGT's\n"
-      "keys: extrinsic (camera-from-world, OpenCV axes), intrinsic, depth, depth_conf, pose_enc,\n"
-      "images; with --point-head also world_points and world_points_conf. Memory grows with the\n"
-      "number of photos, time with its square; the need is told before the work starts.");
+      "The world is close to the first photo's camera, its scale the network's own. The keys are\n"
+      "those of VGGT's demo: extrinsic (camera-from-world, OpenCV axes), intrinsic, depth,\n"
+      "depth_conf, pose_enc, images; with --point-head also world_points, world_points_conf.\n"
+      "Memory grows with the number of photos, time with its square; the need is told before\n"
+      "the work starts.");
 }
 
 }  // namespace vggtcd::cli

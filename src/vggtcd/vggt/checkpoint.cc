@@ -101,6 +101,8 @@ void convert_weights(const std::filesystem::path& from, const std::filesystem::p
                     quote(tensor.name), dtype_name(infos[i].dtype));
       });
     }
+    // A converted tensor's pages need not stay; others may share a storage or be copies of ours.
+    if (file.format == WeightFormat::kSafetensors) release_pages(tensor.data);
     done_values += static_cast<double>(tensor.numel());
     stage.advance(done_values / all_values);
   });
