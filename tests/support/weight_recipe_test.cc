@@ -38,14 +38,16 @@ TEST(WeightRecipe, HashesHaveTheirPublishedValues) {
 }
 
 TEST(WeightRecipe, ElementsHaveTheExpectedBits) {
-  for (const nlohmann::json& element : golden("recipe_vectors.json")["elements"]) {
+  const nlohmann::json vectors = golden("recipe_vectors.json");
+  for (const nlohmann::json& element : vectors["elements"]) {
     const float value = make(element)[element["index"].get<size_t>()];
     EXPECT_EQ(std::bit_cast<uint32_t>(value), hex(element["value_bits"])) << element;
   }
 }
 
 TEST(WeightRecipe, WholeTensorsHaveTheExpectedChecksum) {
-  for (const nlohmann::json& tensor : golden("recipe_vectors.json")["tensors"]) {
+  const nlohmann::json vectors = golden("recipe_vectors.json");
+  for (const nlohmann::json& tensor : vectors["tensors"]) {
     const std::vector<float> values = make(tensor);
     const uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(values.data()), values.size() * 4);
     EXPECT_EQ(crc, hex(tensor["crc32_of_little_endian_f32"])) << tensor;

@@ -27,7 +27,8 @@ Image image_of(const cv::Mat& bgr) {
 // Calls use(number, frame) for every frame; returns how many there are.
 template <typename Use>
 int for_each_frame(const std::string& path, const Use& use) {
-  cv::VideoCapture video(path);
+  // One backend, not whichever OpenCV finds first: they count and seek frames differently.
+  cv::VideoCapture video(path, cv::CAP_FFMPEG);
   int count = 0;
   for (cv::Mat frame; video.isOpened() && video.read(frame); ++count) {
     throw_if_interrupted();
