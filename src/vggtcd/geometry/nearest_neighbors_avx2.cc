@@ -66,9 +66,6 @@ struct Avx2Lanes {
   friend Mask equal(Avx2Lanes x, Avx2Lanes y) {
     return {_mm256_cmp_ps(x.a, y.a, _CMP_EQ_OQ), _mm256_cmp_ps(x.b, y.b, _CMP_EQ_OQ)};
   }
-  friend Avx2Lanes select(Mask where, Avx2Lanes yes, Avx2Lanes no) {
-    return {_mm256_blendv_ps(no.a, yes.a, where.a), _mm256_blendv_ps(no.b, yes.b, where.b)};
-  }
 };
 
 }  // namespace

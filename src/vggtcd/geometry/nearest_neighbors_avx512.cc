@@ -46,9 +46,6 @@ struct Avx512Lanes {
   friend Mask equal(Avx512Lanes a, Avx512Lanes b) {
     return _mm512_cmp_ps_mask(a.v, b.v, _CMP_EQ_OQ);
   }
-  friend Avx512Lanes select(Mask where, Avx512Lanes yes, Avx512Lanes no) {
-    return {_mm512_mask_blend_ps(where, no.v, yes.v)};
-  }
 };
 
 }  // namespace

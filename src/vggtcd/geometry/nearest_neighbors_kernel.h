@@ -21,7 +21,7 @@ constexpr int32_t kLowestIndexNotYetKnown = INT32_MAX;
 constexpr float kLargestFloat = 3.402823466e+38f;
 
 // V offers: load(const float*), all(float), store(float*), + - *, min, max, sqrt, less(V, V) and
-// less_equal(V, V) and equal(V, V) -> V::Mask, select(Mask, V, V), bits(Mask) -> uint32_t,
+// less_equal(V, V) and equal(V, V) -> V::Mask, bits(Mask) -> uint32_t,
 // max_of(V), min_of(V).
 template <typename V>
 class PacketSearch {

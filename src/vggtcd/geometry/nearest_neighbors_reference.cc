@@ -75,9 +75,6 @@ struct ArrayLanes {
   friend Mask equal(const ArrayLanes& a, const ArrayLanes& b) {
     return make_mask([&](int i) { return a.v[i] == b.v[i]; });
   }
-  friend ArrayLanes select(Mask where, const ArrayLanes& yes, const ArrayLanes& no) {
-    return make([&](int i) { return (where >> i & 1u) != 0 ? yes.v[i] : no.v[i]; });
-  }
 };
 
 }  // namespace

@@ -110,10 +110,8 @@ void warp_plane(const GrayView& source, const Warp& warp, double inverse_depth, 
 // Everything one sweep needs; windows where a source is not seen throughout are not scored.
 class Sweep {
  public:
-  Sweep(const GrayView& reference, const InverseDepthRange& range, const SweepOptions& options)
-      : reference_(reference),
-        range_(range),
-        options_(options),
+  Sweep(const GrayView& reference, const SweepOptions& options)
+      : options_(options),
         width_(reference.pinhole.width),
         height_(reference.pinhole.height),
         box_(width_, height_, options.window_radius_px) {
@@ -167,8 +165,6 @@ class Sweep {
     const int side = 2 * options_.window_radius_px + 1;
     return static_cast<float>(side * side);
   }
-  const GrayView& reference_;
-  const InverseDepthRange& range_;
   const SweepOptions& options_;
   int width_, height_;
   BoxSum box_;
@@ -202,7 +198,7 @@ std::vector<uint8_t> sweep_planes(const GrayView& reference,
   std::vector<uint8_t> volume(pixels * planes);
   std::vector<Warp> warps;
   for (const GrayView* source : sources) warps.push_back(warp_of(reference, *source));
-  Sweep sweep(reference, range, options);
+  Sweep sweep(reference, options);
   std::array<Plane, kMaxBest> best;
   for (Plane& plane : best) plane.resize(pixels);
   std::vector<uint8_t> group(pixels * kGroup);
