@@ -6,22 +6,10 @@
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/geometry/voxel_grid.h"
+#include "vggtcd/registration/map_points.h"
 #include "vggtcd/scene/confidence.h"
 
 namespace vggtcd {
-namespace {
-
-std::vector<Eigen::Vector3f> mapped(const std::vector<Eigen::Vector3f>& points,
-                                    const Sim3& b_from_a) {
-  std::vector<Eigen::Vector3f> out;
-  out.reserve(points.size());
-  for (const Eigen::Vector3f& x : points)
-    out.push_back((b_from_a * x.cast<double>()).cast<float>());
-  return out;
-}
-
-}  // namespace
-
 std::span<const EnumName<FineVerdict>> enum_names(FineVerdict) {
   static constexpr EnumName<FineVerdict> kNames[] = {
       {FineVerdict::kRefined, "refined"},
@@ -83,7 +71,7 @@ FineResult refine_translation(const DownsampledCloud& t1, const DownsampledCloud
 
   // 1. Coarse alignment and distances.
   const NearestNeighborIndex index_t2(t2.positions);
-  const NearestNeighbors coarse = index_t2.query(mapped(t1.positions, coarse_t2_from_t1));
+  const NearestNeighbors coarse = index_t2.query(map_points(coarse_t2_from_t1, t1.positions));
   result.median_residual_coarse_u = median(coarse.distance);
 
   // 2. Static set.
@@ -105,7 +93,7 @@ FineResult refine_translation(const DownsampledCloud& t1, const DownsampledCloud
   result.translation_update_u = refined.translation - coarse_t2_from_t1.translation;
 
   // 4. Residual self-check over all points, not just the static ones.
-  const NearestNeighbors fine = index_t2.query(mapped(t1.positions, refined));
+  const NearestNeighbors fine = index_t2.query(map_points(refined, t1.positions));
   const double median_fine = median(fine.distance);
   result.median_residual_fine_u = median_fine;
   const bool improved = median_fine < result.median_residual_coarse_u;

@@ -5,17 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vggtcd/registration/map_points.h"
+
 namespace vggtcd {
 namespace {
-
-std::vector<Eigen::Vector3f> mapped(const std::vector<Eigen::Vector3f>& points,
-                                    const Sim3& b_from_a) {
-  std::vector<Eigen::Vector3f> out;
-  out.reserve(points.size());
-  for (const Eigen::Vector3f& x : points)
-    out.push_back((b_from_a * x.cast<double>()).cast<float>());
-  return out;
-}
 
 int32_t count_of(const std::vector<int32_t>& frames) {
   return frames.empty() ? 0 : *std::max_element(frames.begin(), frames.end()) + 1;
@@ -31,8 +24,8 @@ SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t
 
 std::vector<SurfacePair> SurfaceMatcher::pairs(const Sim3& t2_from_t1) const {
   const Sim3 t1_from_t2 = t2_from_t1.inverse();
-  const NearestNeighbors of_t1 = index_t2_.query(mapped(t1_.positions, t2_from_t1));
-  const NearestNeighbors of_t2 = index_t1_.query(mapped(t2_.positions, t1_from_t2));
+  const NearestNeighbors of_t1 = index_t2_.query(map_points(t2_from_t1, t1_.positions));
+  const NearestNeighbors of_t2 = index_t1_.query(map_points(t1_from_t2, t2_.positions));
   std::vector<SurfacePair> result;
   result.reserve(t1_.size() + t2_.size());
   const auto add = [&](size_t i1, size_t i2, bool search_from_t1) {
