@@ -2,6 +2,8 @@
 // The colours of change. Below the threshold a point is static and stays in the cold part of the map;
 // from the threshold to the end of the scale it runs through the warm part.
 
+import type { Label } from './data';
+
 export type Rgb = [number, number, number];
 export type MapName = 'spectrum' | 'safe';
 
@@ -21,12 +23,13 @@ export const kMaps: Record<MapName, ColorMap> = {
   },
 };
 
-export const kLabelColors: Record<string, Rgb> = {
-  unchanged: [74, 108, 168],
-  removed: [230, 120, 40],
-  added: [86, 180, 233],
-  unobserved: [128, 132, 138],
-  moved: [204, 121, 167],
+// Grey is what stayed; vermilion, green and purple of Okabe and Ito's set are apart for any colour vision.
+export const kLabelColors: Record<Label, Rgb> = {
+  unchanged: [164, 173, 186],
+  removed: [213, 94, 0],
+  added: [0, 158, 115],
+  unobserved: [92, 97, 106],
+  moved: [190, 100, 160],
 };
 
 export const kEpochColors: Record<'before' | 'after', Rgb> = {

@@ -7,6 +7,8 @@ export const kNoEvidence = 255;  // level of a pixel that says nothing
 
 // Labels of the visibility method; with the distance method there are none.
 export const kLabels = ['unchanged', 'removed', 'added', 'unobserved', 'moved'] as const;
+export type Label = (typeof kLabels)[number];
+export const isChangedLabel = (label: number): boolean => label === 1 || label === 2 || label === 4;
 
 export type Json = null | boolean | number | string | Json[] | { [key: string]: Json };
 export type JsonObject = { [key: string]: Json };
@@ -58,7 +60,8 @@ export interface Report {
   scene: { extent: number };
   levels: { count: number; threshold: number; threshold_value: number };
   // above[k]: pixels whose score is above edge k, for k = 0 .. levels.count
-  evidence: Record<Epoch, { pixels: number; above: number[] }>;
+  // labels[l]: pixels with label l, where the method gives labels.
+  evidence: Record<Epoch, { pixels: number; above: number[]; labels?: number[] }>;
   clouds: CloudHeader[];
   photos: PhotoHeader[];
   summary: JsonObject;
@@ -190,6 +193,20 @@ export function changedPixels(report: Report, k: number, epochs: readonly Epoch[
     pixels += report.evidence[epoch].pixels;
   }
   return { changed, pixels };
+}
+
+export const hasLabels = (report: Report): boolean => kEpochs.some((epoch) => report.evidence[epoch].labels !== undefined);
+
+// Pixels by label. Unobserved ones are no evidence either way: shares are of the pixels that were judged.
+export interface LabelCount { byLabel: Record<Label, number>; changed: number; judged: number; all: number }
+export function labelledPixels(report: Report, epochs: readonly Epoch[] = kEpochs): LabelCount {
+  const byLabel = { unchanged: 0, removed: 0, added: 0, unobserved: 0, moved: 0 };
+  for (const epoch of epochs) {
+    kLabels.forEach((label, i) => { byLabel[label] += report.evidence[epoch].labels?.[i] ?? 0; });
+  }
+  const changed = byLabel.removed + byLabel.added + byLabel.moved;
+  const judged = changed + byLabel.unchanged;
+  return { byLabel, changed, judged, all: judged + byLabel.unobserved };
 }
 
 // The centre of a camera in the world and its axes (columns: right, down, forward).

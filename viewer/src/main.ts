@@ -2,7 +2,7 @@
 // The report page: reads its data block, builds header, 3D view, photos and numbers, and joins them.
 import './style.css';
 import * as THREE from 'three';
-import { changedPixels, decodeCloud, edgeValue, kEpochs, parseReport, type Report } from './data';
+import { changedPixels, decodeCloud, edgeValue, hasLabels, kEpochs, labelledPixels, parseReport, type Report } from './data';
 import { h } from './dom';
 import { count, number, percent, shorten } from './format';
 import { listenForKeys, makeCommands, makeHelp } from './keyboard';
@@ -12,14 +12,14 @@ import { makeNumbers, verdictSentence } from './panels/numbers';
 import { makePhotoCard, stepPhoto } from './panels/photo_card';
 import { Photos } from './panels/photos';
 import { makeSwipe } from './panels/swipe';
-import { Store, type State } from './store';
+import { decidesByLabel, Store, type State } from './store';
 import { Viewer } from './view3d/viewer';
 
 const app = document.getElementById('app')!;
 
 function initialState(report: Report): State {
   return {
-    tab: 'view', show: 'after', color: report.clouds.some((c) => c.label !== undefined) ? 'label' : 'distance',
+    tab: 'view', show: hasLabels(report) ? 'both' : 'after', color: hasLabels(report) ? 'label' : 'distance',
     map: 'spectrum', threshold: report.levels.threshold, hideStatic: false, cameras: true, shading: true,
     pointSize: 4, swipe: 0.5, photo: null, wipe: 0.5, measuring: false,
   };
@@ -71,10 +71,16 @@ function makeTabs(store: Store, panes: Record<State['tab'], HTMLElement>): HTMLE
 function makeHeadline(report: Report, store: Store): HTMLElement {
   const share = h('b', {});
   const beyond = h('span', {});
-  store.on(['threshold'], ({ threshold }) => {
-    const { changed, pixels } = changedPixels(report, threshold);
+  store.on(['threshold', 'color'], (state) => {
+    if (decidesByLabel(report, state)) {
+      const { changed, judged } = labelledPixels(report);
+      share.textContent = percent(changed / judged);
+      beyond.textContent = ' changed, of what both epochs saw';
+      return;
+    }
+    const { changed, pixels } = changedPixels(report, state.threshold);
     share.textContent = percent(changed / pixels);
-    beyond.textContent = ` farther than ${number(edgeValue(report, threshold))} ${report.unit} from the other epoch`;
+    beyond.textContent = ` farther than ${number(edgeValue(report, state.threshold))} ${report.unit} from the other epoch`;
   });
   const photos = kEpochs.map((epoch) => report.photos.filter((p) => p.epoch === epoch).length);
   const points = report.clouds.reduce((sum, cloud) => sum + cloud.points, 0);
@@ -131,7 +137,7 @@ async function start(): Promise<void> {
   } });
   const photos = new Photos(report, store, lookFrom);
   const numbers = makeNumbers(report, store, (photo) => store.set({ photo, tab: 'photos' }));
-  const commands = makeCommands(store, report.levels.count, report.clouds.some((c) => c.label !== undefined), {
+  const commands = makeCommands(store, report.levels.count, hasLabels(report), {
     turn: (x, y) => viewer?.navigation.turn(x, y), pan: (x, y) => viewer?.navigation.pan(x, y),
     zoom: (factor) => viewer?.navigation.zoom(factor), home: () => viewer?.navigation.home(),
     place: (by) => controls.step(by), photo: (by) => stepPhoto(report, store, by),

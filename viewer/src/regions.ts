@@ -10,7 +10,9 @@ export interface Region {
   size: [number, number, number];
 }
 
-export function findRegions(cloud: Cloud, threshold: number, voxel: number): Region[] {
+export type IsChanged = (level: number, label: number) => boolean;
+
+export function findRegions(cloud: Cloud, isChanged: IsChanged, voxel: number): Region[] {
   const { box_min, box_size, epoch } = cloud.header;
   const q = cloud.positionLevel;
   const step = box_size.map((size) => size / 65535);
@@ -20,7 +22,7 @@ export function findRegions(cloud: Cloud, threshold: number, voxel: number): Reg
   // Sums per voxel: count, x y z, min and max.
   const cells = new Map<number, number[]>();
   for (let i = 0; i < q.length; i += 4) {
-    if (q[i + 3]! <= threshold) continue;
+    if (!isChanged(q[i + 3]!, cloud.colorLabel[i + 3]!)) continue;
     const p = [q[i]! * step[0]!, q[i + 1]! * step[1]!, q[i + 2]! * step[2]!];
     const k = key(Math.floor(p[0]! / voxel) + 1, Math.floor(p[1]! / voxel) + 1,
       Math.floor(p[2]! / voxel) + 1);
@@ -75,8 +77,8 @@ export function findRegions(cloud: Cloud, threshold: number, voxel: number): Reg
 }
 
 // The largest places of both epochs, largest first; specks below half a percent of the change are left out.
-export function largestRegions(clouds: Cloud[], threshold: number, extent: number, most: number): Region[] {
-  const all = clouds.flatMap((cloud) => findRegions(cloud, threshold, extent / 64));
+export function largestRegions(clouds: Cloud[], isChanged: IsChanged, extent: number, most: number): Region[] {
+  const all = clouds.flatMap((cloud) => findRegions(cloud, isChanged, extent / 64));
   const total = all.reduce((sum, region) => sum + region.points, 0);
   return all.filter((region) => region.points >= Math.max(20, 0.005 * total))
     .sort((a, b) => b.points - a.points).slice(0, most);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the user has chosen, in one place; parts of the page listen to the keys they draw from.
 import type { MapName } from './colormap';
+import { hasLabels, isChangedLabel, type Report } from './data';
 
 export interface State {
   tab: 'view' | 'photos' | 'numbers';
@@ -17,6 +18,14 @@ export interface State {
   wipe: number;           // 0 photo .. 1 heat map
   measuring: boolean;
 }
+
+// What a point must be to count as changed: the result's own labels, unless the user looks at distances.
+export const decidesByLabel = (report: Report, { color }: Pick<State, 'color'>): boolean =>
+  hasLabels(report) && color !== 'distance';
+
+// The same as a test of a point: its level and its label.
+export const changedTest = (report: Report, state: Pick<State, 'color' | 'threshold'>): ((level: number, label: number) => boolean) =>
+  (decidesByLabel(report, state) ? (_, label) => isChangedLabel(label) : (level) => level > state.threshold);
 
 type Listener = (state: State) => void;
 

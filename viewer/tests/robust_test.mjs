@@ -86,10 +86,19 @@ test('labels and a list of changes are shown when the result has them', async ()
     { class: 'removed', epoch: 'before', center: [-1, 1.2, 1.6], size: [0.6, 0.55, 0.6], share: 0.3 }];
   const { page, troubles, close } = await open(browser, writePage(fill(template(), report)));
   assert.equal((await getState(page)).color, 'label');
+  await setState(page, { show: 'after' });
   const added = await picture(page);
   await setState(page, { show: 'before' });
   assert.ok(await difference(page, added, await picture(page)) > 0.05, 'added and removed have colours of their own');
   await page.waitForFunction(() => document.querySelectorAll('.places button').length === 2);
+  // The panel counts by label: what was not observed is neither changed nor unchanged.
+  const [b, a] = [report.evidence.before.labels, report.evidence.after.labels];
+  assert.equal(Number(await page.locator('#label-count').getAttribute('data-count')), b[1] + a[2]);
+  assert.ok((await page.textContent('#label-count')).replace(/\s/g, '').includes(`${b[0] + b[1] + a[0] + a[2]}pixels`));
+  assert.ok(await page.locator('#threshold').isHidden());
+  await setState(page, { color: 'distance' });
+  assert.ok(await page.locator('#threshold').isVisible());
+  assert.ok(await page.locator('#label-count').isHidden());
   assert.deepEqual(troubles, []);
   await close();
 });

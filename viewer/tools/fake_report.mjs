@@ -216,7 +216,13 @@ export function fakeReport({ points = 200000, photos = 12, width = 320, seed = 1
     clouds.push(encodeCloud(epoch, list, addBlock, { points: list.length / 7, changed: changedPoints }));
   }
   if (labels) {
-    for (const cloud of clouds) cloud.label = addBlock(deflateSync(Buffer.alloc(cloud.shown, cloud.epoch === 'before' ? 1 : 2)));
+    for (const cloud of clouds) {
+      cloud.label = addBlock(deflateSync(Buffer.alloc(cloud.shown, cloud.epoch === 'before' ? 1 : 2)));
+      const { pixels } = evidence[cloud.epoch];
+      const tenth = Math.floor(pixels / 10);
+      evidence[cloud.epoch].labels = cloud.epoch === 'before' ? [pixels - 4 * tenth, tenth, 0, 3 * tenth, 0]
+        : [pixels - 3 * tenth, 0, 2 * tenth, tenth, 0];
+    }
   }
   return { format: 'vggt-cd-report', version: 1, generator: 'vggt-cd 0.1.0 (generated example)', title, unit: 'u',
     scene: { extent }, levels: { count: kLevels, threshold: thresholdLevel, threshold_value: tau }, evidence, clouds,

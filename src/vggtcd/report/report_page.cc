@@ -180,9 +180,20 @@ CloudPair encode_within(const ReportInput& input, const Candidates& before, cons
   return clouds;
 }
 
+// How many pixels have each label; others have no evidence.
+std::array<int64_t, 5> count_labels(std::span<const uint8_t> labels) {
+  std::array<int64_t, 256> counts{};
+  for (const uint8_t label : labels) ++counts[label];
+  std::array<int64_t, 5> known{};
+  std::copy_n(counts.begin(), known.size(), known.begin());
+  return known;
+}
+
 Json score_json(const ReportEpoch& epoch, const LevelScale& scale) {
   const ScoreCounts counts = count_scores(epoch.score, scale);
-  return {{"pixels", counts.pixels}, {"above", counts.above}};
+  Json json = {{"pixels", counts.pixels}, {"above", counts.above}};
+  if (!epoch.label.empty()) json["labels"] = count_labels(epoch.label);
+  return json;
 }
 
 // JSON text that may stand inside an HTML element.

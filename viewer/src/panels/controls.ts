@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel beside the 3D view.
 import { kMaps, type MapName } from '../colormap';
-import type { Cloud, Report } from '../data';
+import { hasLabels, type Cloud, type Report } from '../data';
 import { checkbox, h, segmented } from '../dom';
 import { count, percent, words } from '../format';
 import { largestRegions } from '../regions';
-import type { State, Store } from '../store';
+import { changedTest, type State, type Store } from '../store';
+import { makeAnswers } from './answers';
 import { makeThreshold } from './threshold';
 
 export interface Place {
@@ -25,7 +26,7 @@ export interface Actions {
 const diagonal = (size: readonly number[]): number => Math.hypot(...size);
 
 // The places of change: the result's own list if it has one, else groups of changed points.
-function findPlaces(report: Report, clouds: Cloud[], threshold: number): Place[] {
+function findPlaces(report: Report, clouds: Cloud[], state: State): Place[] {
   if (report.changes) {
     return report.changes.slice(0, 200).map((change, i) => ({
       title: `${i + 1}. ${words(change.class ?? change.epoch ?? 'change')}`,
@@ -33,7 +34,7 @@ function findPlaces(report: Report, clouds: Cloud[], threshold: number): Place[]
       kind: change.class ?? change.epoch ?? '', center: change.center, size: diagonal(change.size),
     }));
   }
-  const regions = largestRegions(clouds, threshold, report.scene.extent, 12);
+  const regions = largestRegions(clouds, changedTest(report, state), report.scene.extent, 12);
   const shown = clouds.reduce((sum, cloud) => sum + cloud.header.changed_shown, 0);
   return regions.map((region, i) => ({
     title: `${i + 1}. in the ${region.epoch} epoch`,
@@ -53,11 +54,11 @@ export class Controls {
   constructor(private readonly report: Report, private readonly store: Store,
               private readonly actions: Actions) {
     const { state } = store;
-    const labels = report.clouds.some((cloud) => cloud.label !== undefined);
+    const labels = hasLabels(report);
     const show = segmented<State['show']>('Show', [['before', 'Before'], ['after', 'After'], ['both', 'Both'],
       ['swipe', 'Swipe']], state.show, (value) => store.set({ show: value }));
     const color = segmented<State['color']>('Colour by', [['photo', 'Photo'], ['distance', 'Distance'],
-      ['epoch', 'Epoch'], ...(labels ? [['label', 'Label'] as const] : [])], state.color,
+      ['epoch', 'Epoch'], ...(labels ? [['label', 'Answer'] as const] : [])], state.color,
       (value) => store.set({ color: value }));
     const map = segmented<MapName>('Colour map', (Object.keys(kMaps) as MapName[])
       .map((name) => [name, kMaps[name].title] as const), state.map, (value) => store.set({ map: value }));
@@ -78,9 +79,9 @@ export class Controls {
       size.value = String(s.pointSize);
       measure.setAttribute('aria-pressed', String(s.measuring));
     });
-    store.on(['threshold'], () => this.refreshPlaces(250));
+    store.on(['threshold', 'color'], () => this.refreshPlaces(250));
     this.root = h('aside', { class: 'panel', 'aria-label': 'Settings of the 3D view' },
-      makeThreshold(report, store),
+      makeAnswers(report, store), makeThreshold(report, store),
       h('section', { class: 'group' }, show.root, color.root, map.root),
       h('section', { class: 'group' }, hide.root, cameras.root, shading.root,
         h('div', { class: 'row' }, h('label', { for: 'point-size' }, 'Point size'), size)),
@@ -111,7 +112,7 @@ export class Controls {
   private refreshPlaces(delayMs: number): void {
     window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
-      this.places = findPlaces(this.report, this.clouds, this.store.state.threshold);
+      this.places = findPlaces(this.report, this.clouds, this.store.state);
       this.place = -1;
       this.list.replaceChildren(...this.places.map((place, i) => h('li', {},
         h('button', { type: 'button', onclick: () => this.go(i) }, h('i', { class: `dot ${place.kind}` }),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the colours of the 3D view mean.
 import { css, kEpochColors, kLabelColors, levelColor } from '../colormap';
-import { edgeValue, kLabels, type Report } from '../data';
+import { edgeValue, kLabels, labelledPixels, type Report } from '../data';
 import { h } from '../dom';
 import { number } from '../format';
 import type { Store } from '../store';
@@ -32,8 +32,9 @@ export function makeLegend(report: Report, store: Store): HTMLElement {
     } else if (color === 'epoch') {
       root.replaceChildren(swatches([[css(kEpochColors.before), 'before'], [css(kEpochColors.after), 'after']]));
     } else if (color === 'label') {
-      const used = kLabels.filter((name) => name !== 'moved');
-      root.replaceChildren(swatches(used.map((name) => [css(kLabelColors[name]!), name])));
+      const { byLabel } = labelledPixels(report);
+      const used = kLabels.filter((name) => name !== 'moved' || byLabel.moved > 0);
+      root.replaceChildren(swatches(used.map((name) => [css(kLabelColors[name]), name])));
     } else {
       root.replaceChildren();
     }

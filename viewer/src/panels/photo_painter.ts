@@ -2,7 +2,7 @@
 // A photo with its heat map on one canvas: the map covers the photo from the left up to the wipe.
 import { kLabelColors, levelTable } from '../colormap';
 import { decodeHeat, kLabels, kNoEvidence, photoUrl, type Heat, type Report } from '../data';
-import type { State } from '../store';
+import { decidesByLabel, type State } from '../store';
 
 export class PhotoPainter {
   readonly canvas: HTMLCanvasElement;
@@ -68,7 +68,7 @@ export class PhotoPainter {
   }
 
   private color(heat: Heat, { map, threshold, color }: Pick<State, 'map' | 'threshold' | 'color'>): void {
-    const labels = color === 'label' ? heat.label : null;
+    const labels = decidesByLabel(this.report, { color }) ? heat.label : null;
     const key = `${map} ${threshold} ${labels !== null}`;
     if (key === this.layerKey && this.layer) return;
     this.layerKey = key;
@@ -82,8 +82,8 @@ export class PhotoPainter {
       const level = heat.level[i]!;
       const label = labels ? kLabels[labels[i]!] : undefined;
       if (label) {
-        image.data.set(kLabelColors[label]!, 4 * i);
-        image.data[4 * i + 3] = label === 'unobserved' || label === 'unchanged' ? 120 : 225;
+        image.data.set(kLabelColors[label], 4 * i);
+        image.data[4 * i + 3] = label === 'unchanged' ? 70 : label === 'unobserved' ? 190 : 215;
       } else if (level === kNoEvidence || labels) {
         image.data.set([18, 20, 24, 150], 4 * i);  // nothing known: the photo, dimmed
       } else {

@@ -4,7 +4,7 @@ import { Histogram } from '../charts';
 import { changedPixels, edgeValue, type Report } from '../data';
 import { h } from '../dom';
 import { count, number, percent } from '../format';
-import type { Store } from '../store';
+import { decidesByLabel, type Store } from '../store';
 
 export function makeThreshold(report: Report, store: Store): HTMLElement {
   const { count: levels, threshold: own } = report.levels;
@@ -34,9 +34,11 @@ export function makeThreshold(report: Report, store: Store): HTMLElement {
     }));
     reset.hidden = threshold === own;
   });
-  return h('section', { class: 'group threshold' },
+  const root = h('section', { class: 'group threshold' },
     h('div', { class: 'row' }, h('label', { for: 'threshold' }, 'Changed beyond'), value),
     h('div', { class: 'scale' }, histogram.root, slider),
     h('p', { class: 'share', 'aria-live': 'polite' }, share, ' changed', h('br'), pixels),
     h('div', { class: 'row' }, epochs, reset));
+  store.on(['color'], (state) => { root.hidden = decidesByLabel(report, state); });
+  return root;
 }

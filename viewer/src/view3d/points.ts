@@ -32,6 +32,8 @@ const vertexShader = /* glsl */ `
     // A little of the photo's light and shade stays, so that the shape can be read.
     else if (mode == 1) v_color = texelFetch(levels, ivec2(int(position.w), 0), 0).rgb * shade;
     else if (mode == 2) v_color = epoch_color * (shade - 0.15);
+    // What stayed keeps a breath of its photo; the answers that matter have their pure colours.
+    else if (label == 0) v_color = mix(label_colors[0] * shade, photo, 0.4);
     else v_color = label < 5 ? label_colors[label] * shade : vec3(0.5);
     vec4 x_in_camera = modelViewMatrix * vec4(box_min + position.xyz * box_step, 1.0);
     gl_Position = projectionMatrix * x_in_camera;
@@ -105,7 +107,7 @@ export class PointLayer {
         box_min: { value: new THREE.Vector3(...box_min) },
         box_step: { value: new THREE.Vector3(...box_size).divideScalar(65535) },
         epoch_color: { value: rgb(kEpochColors[epoch]) },
-        label_colors: { value: kLabels.map((name) => rgb(kLabelColors[name]!)) },
+        label_colors: { value: kLabels.map((name) => rgb(kLabelColors[name])) },
       },
     });
     this.object = new THREE.Points(this.geometry, material);

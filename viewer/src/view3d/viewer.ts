@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 import { levelTable } from '../colormap';
 import type { Cloud, Report } from '../data';
-import type { Store, State } from '../store';
+import { changedTest, decidesByLabel, type State, type Store } from '../store';
 import { DepthShading } from './depth_shading';
 import { FrustumLayer, type Frustum } from './frustums';
 import { Measure } from './measure';
@@ -59,7 +59,7 @@ export class Viewer {
     });
     store.on(['color', 'hideStatic', 'pointSize', 'cameras', 'show', 'swipe', 'shading'], (state) => {
       this.uniforms.mode.value = kModes[state.color];
-      this.uniforms.by_label.value = state.color === 'label';
+      this.uniforms.by_label.value = decidesByLabel(report, state);
       this.uniforms.hide_static.value = state.hideStatic;
       this.uniforms.point_size.value = 0.25 * state.pointSize * this.spacing;
       this.draw();
@@ -220,8 +220,8 @@ export class Viewer {
     const { show, swipe, hideStatic, threshold, color } = this.store.state;
     const { clientWidth: width, clientHeight: height } = this.element;
     const shown = show === 'swipe' ? (x < swipe * width ? 'before' : 'after') : show;
-    const accepts = (level: number, label: number): boolean =>
-      !hideStatic || (color === 'label' ? label === 1 || label === 2 || label === 4 : level > threshold);
+    const changed = changedTest(this.report, { color, threshold });
+    const accepts = (level: number, label: number): boolean => !hideStatic || changed(level, label);
     return pickPoint(this.layers.filter(({ cloud }) => shown === 'both' || shown === cloud.header.epoch)
       .map(({ cloud }) => ({ cloud, accepts })), this.navigation.camera, x, y, width, height, 9);
   }
