@@ -17,44 +17,6 @@ void AlignmentOptions::validate() const {
   robust.validate();
 }
 
-namespace {
-
-// Refines all seven parameters and takes the candidate that fits the surfaces of both epochs best.
-void choose_robust(const Reconstruction& before, const Reconstruction& after,
-                   const AlignmentOptions& options, Alignment& result) {
-  const OrientedPoints t1 = oriented_points(before, options.robust.robust_grid_resolution);
-  const OrientedPoints t2 = oriented_points(after, options.robust.robust_grid_resolution);
-  result.robust = align_robust(t1, t2, result.initial_t2_from_t1, options.robust);
-  result.candidates = {{result.chosen, result.initial_t2_from_t1, 0}};
-  if (result.fine->verdict == FineVerdict::kRefined) {
-    result.candidates.push_back({"fine", result.fine->t2_from_t1, 0});
-  }
-  if (result.robust->verdict == RobustVerdict::kRefined) {
-    result.candidates.push_back({"robust", result.robust->t2_from_t1, 0});
-  }
-  result.verdict = enum_to_string(result.robust->verdict);
-  result.explanation = result.robust->explanation;
-  if (!(result.robust->residual_sigma_u > 0)) {  // too little surface to compare anything on
-    result.candidates.resize(1);
-    return;
-  }
-  const Alignment::Candidate* best = nullptr;
-  for (Alignment::Candidate& candidate : result.candidates) {
-    candidate.cost = surface_cost(t1, t2, candidate.t2_from_t1, result.robust->residual_sigma_u,
-                                  options.robust.min_normal_cosine);
-    if (!best || candidate.cost < best->cost) best = &candidate;
-  }
-  result.chosen = best->name;
-  result.t2_from_t1 = best->t2_from_t1;
-  if (best->name == "fine") {
-    result.verdict = enum_to_string(result.fine->verdict);
-    result.explanation =
-        result.fine->explanation + " The full refinement fits the surfaces less well.";
-  }
-}
-
-}  // namespace
-
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
   Alignment result;
@@ -91,8 +53,17 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
     result.explanation = result.fine->explanation;
   }
   if (options.method == AlignmentMethod::kRobust) {
-    log.run("robust alignment",
-            [&](ProgressStage&) { choose_robust(before, after, options, result); });
+    log.run("robust alignment", [&](ProgressStage&) {
+      AlignmentChoice choice =
+          choose_alignment(before, after, {result.chosen, result.initial_t2_from_t1, 0},
+                           *result.fine, options.robust);
+      result.t2_from_t1 = choice.t2_from_t1;
+      result.chosen = std::move(choice.chosen);
+      result.verdict = std::move(choice.verdict);
+      result.explanation = std::move(choice.explanation);
+      result.robust = std::move(choice.robust);
+      result.candidates = std::move(choice.candidates);
+    });
   }
   return result;
 }

@@ -10,6 +10,7 @@
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/pipeline/stage_log.h"
+#include "vggtcd/registration/candidates.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 #include "vggtcd/registration/robust.h"
@@ -57,20 +58,14 @@ struct InitialAlignment {
 };
 
 struct Alignment {
-  Sim3 t2_from_t1;                     // chosen: x_T2 = s R x_T1 + t
-  Sim3 initial_t2_from_t1;             // before refinement
-  std::string initial_source;          // as in InitialAlignment
-  std::optional<CoarseResult> coarse;  // with a joint pass
-  std::optional<FineResult> fine;      // with methods paper and robust
-  std::optional<RobustResult> robust;  // with method robust
-  // With method robust: what was compared, by surface_cost at one scale; the smallest was chosen.
-  struct Candidate {
-    std::string name;
-    Sim3 t2_from_t1;
-    double cost = 0;
-  };
-  std::vector<Candidate> candidates;
-  std::string chosen;       // "coarse", "fine", "robust" or "initial"
+  Sim3 t2_from_t1;                             // chosen: x_T2 = s R x_T1 + t
+  Sim3 initial_t2_from_t1;                     // before refinement
+  std::string initial_source;                  // as in InitialAlignment
+  std::optional<CoarseResult> coarse;          // with a joint pass
+  std::optional<FineResult> fine;              // with methods paper and robust
+  std::optional<RobustResult> robust;          // with method robust
+  std::vector<AlignmentCandidate> candidates;  // with method robust: what was compared
+  std::string chosen;                          // "coarse", "fine", "robust" or "initial"
   std::string verdict;      // machine-readable: refined, kept_coarse_..., coarse, given
   std::string explanation;  // one sentence
 };

@@ -153,7 +153,7 @@ Json alignment_json(const Alignment& alignment) {
   }
   if (alignment.fine) json["fine"] = fine_json(*alignment.fine);
   if (alignment.robust) json["robust"] = robust_json(*alignment.robust);
-  for (const Alignment::Candidate& candidate : alignment.candidates) {
+  for (const AlignmentCandidate& candidate : alignment.candidates) {
     json["candidates"].push_back({{"name", candidate.name}, {"surface_cost", candidate.cost}});
   }
   return json;

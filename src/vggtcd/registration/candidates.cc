@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Comparing candidates by one cost on the surfaces of both epochs.
+#include "vggtcd/registration/candidates.h"
+
+#include <algorithm>
+
+#include "vggtcd/scene/oriented_points.h"
+
+namespace vggtcd {
+
+AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruction& after,
+                                 const AlignmentCandidate& initial, const FineResult& fine,
+                                 const RobustOptions& options) {
+  const OrientedPoints t1 = oriented_points(before, options.robust_grid_resolution);
+  const OrientedPoints t2 = oriented_points(after, options.robust_grid_resolution);
+  AlignmentChoice choice;
+  choice.robust = align_robust(t1, t2, initial.t2_from_t1, options);
+  choice.t2_from_t1 = initial.t2_from_t1;
+  choice.chosen = initial.name;
+  choice.verdict = enum_to_string(choice.robust.verdict);
+  choice.explanation = choice.robust.explanation;
+  choice.candidates = {initial};
+  // Too little surface to compare anything on.
+  if (!(choice.robust.residual_sigma_u > 0)) return choice;
+  if (fine.verdict == FineVerdict::kRefined) {
+    choice.candidates.push_back({"fine", fine.t2_from_t1, 0});
+  }
+  if (choice.robust.verdict == RobustVerdict::kRefined) {
+    choice.candidates.push_back({"robust", choice.robust.t2_from_t1, 0});
+  }
+  for (AlignmentCandidate& candidate : choice.candidates) {
+    candidate.cost = surface_cost(t1, t2, candidate.t2_from_t1, choice.robust.residual_sigma_u,
+                                  options.min_normal_cosine);
+  }
+  const AlignmentCandidate& best = *std::min_element(
+      choice.candidates.begin(), choice.candidates.end(),
+      [](const AlignmentCandidate& a, const AlignmentCandidate& b) { return a.cost < b.cost; });
+  choice.chosen = best.name;
+  choice.t2_from_t1 = best.t2_from_t1;
+  if (best.name == "fine") {
+    choice.verdict = enum_to_string(fine.verdict);
+    choice.explanation = fine.explanation + " The full refinement fits the surfaces less well.";
+  }
+  return choice;
+}
+
+}  // namespace vggtcd
