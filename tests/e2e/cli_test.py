@@ -4,6 +4,7 @@
 
 Usage: cli_test.py PROGRAM EXAMPLE_DIR [unittest arguments]
 """
+import csv
 import json
 import os
 import pathlib
@@ -91,6 +92,25 @@ class Detect(unittest.TestCase):
             self.assertEqual(len(ply), evidence.sum())
             np.testing.assert_array_equal(np.sort(ply["scalar_change_distance"]), np.sort(score[evidence]))
             self.assertEqual(int(ply["scalar_changed"].sum()), int(changed.sum()))
+
+    def test_changed_things_agree_with_their_pixels(self):
+        things = json.loads((self.out / "changes.json").read_text())["changes"]
+        change = np.load(self.out / "change.npz")
+        self.assertGreater(len(things), 2)
+        for number, thing in enumerate(things, 1):
+            self.assertEqual(thing["id"], number)
+            self.assertIn(thing["class"], ["added", "removed", "moved"])
+            for part, epoch in (("before", "t1"), ("after", "t2")):
+                pixels = change[f"instance_{epoch}"] == number
+                self.assertEqual(pixels.sum(), thing[part]["pixels"] if part in thing else 0)
+                self.assertTrue(change[f"changed_{epoch}"][pixels].all())
+                for photo in thing.get(part, {}).get("photos", []):
+                    self.assertEqual(pixels[photo["frame"]].sum(), photo["pixels"])
+        ranks = [thing["volume_u3"] * thing["confidence"] for thing in things]
+        self.assertEqual(ranks, sorted(ranks, reverse=True))
+        with open(self.out / "changes.csv", newline="") as table:
+            rows = list(csv.DictReader(table))
+        self.assertEqual([float(row["volume_u3"]) for row in rows], [t["volume_u3"] for t in things])
 
     def test_every_photo_has_an_overlay(self):
         frames = np.load(EXAMPLE / "t1.npz")["depth"].shape[0]

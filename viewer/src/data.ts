@@ -47,7 +47,9 @@ export interface Change {
   class?: string;
   center: [number, number, number];
   size: [number, number, number];
-  volume?: number;
+  volume_u3?: number;
+  volume_sigma_u3?: number;
+  confidence?: number;
   share?: number;
 }
 

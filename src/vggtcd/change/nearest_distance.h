@@ -36,9 +36,10 @@ struct EpochChange {
   std::vector<float> score;
   // [S, H, W] or empty. Where present it decides, and the score only says how far.
   std::vector<ChangeLabel> label;
-  int64_t points = 0;      // pixels with evidence
-  int64_t changed = 0;     // of them called changed
-  int64_t unobserved = 0;  // of them not seen by the other epoch; known with labels only
+  std::vector<float> confidence;  // [S, H, W] or empty: in the label, 0 to 1
+  int64_t points = 0;             // pixels with evidence
+  int64_t changed = 0;            // of them called changed
+  int64_t unobserved = 0;         // of them not seen by the other epoch; known with labels only
 };
 
 struct ChangeSet {
@@ -46,6 +47,8 @@ struct ChangeSet {
   double scene_extent_u = 0;  // robust extent of the after epoch's points, T2 units
   double threshold_u = 0;     // tau
   double bound_u = 0;         // scores are exact below, equal to it beyond
+  double surface_sigma_u =
+      0;  // by which the epochs' surfaces disagree where nothing changed; 0: not known
 
   // Eq. 8 and its threshold: evidence and farther than tau. NaN compares false.
   bool changed(float score) const { return score > static_cast<float>(threshold_u); }

@@ -56,6 +56,8 @@ void add_detect(Program& program) {
                  percent(outcome.unobserved_t1, outcome.points_t1),
                  percent(outcome.unobserved_t2, outcome.points_t2));
     }
+    fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
+               outcome.moved);
     fmt::print("Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
                epochs.out);
   };
@@ -84,6 +86,7 @@ void add_detect(Program& program) {
   command->get_option("--change-method")->group("Change");
   add_fields(command, arguments->options.change, "Change");
   add_fields(command, arguments->options.free_space, "Change");
+  add_fields(command, arguments->options.instances, "Instances");
   add_field(command, "overlays", arguments->options.overlays,
             "Write overlays/: each photo beside its heat map.");
   add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");

@@ -7,6 +7,7 @@
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/sim3_file.h"
+#include "vggtcd/pipeline/change_list.h"
 #include "vggtcd/pipeline/results.h"
 #include "vggtcd/registration/shared_intrinsics.h"
 #include "vggtcd/report/read_results.h"
@@ -92,6 +93,8 @@ std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
 void DetectOptions::validate() const {
   alignment.validate();
   change.validate();
+  free_space.validate();
+  instances.validate();
   report.validate();
 }
 
@@ -124,6 +127,15 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space), changes);
     });
   }
+  ChangeInstances instances;
+  log.run("changed things", [&](ProgressStage&) {
+    instances = find_instances(epochs.before, epochs.after, t2_from_t1, changes, options.instances);
+  });
+  for (const ChangeInstance& instance : instances.instances) {
+    outcome.removed += instance.kind == InstanceClass::kRemoved ? 1 : 0;
+    outcome.added += instance.kind == InstanceClass::kAdded ? 1 : 0;
+    outcome.moved += instance.kind == InstanceClass::kMoved ? 1 : 0;
+  }
   outcome.points_t1 = changes.t1.points;
   outcome.changed_t1 = changes.t1.changed;
   outcome.points_t2 = changes.t2.points;
@@ -136,7 +148,8 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   log.run("write results", [&](ProgressStage& stage) {
     write_json_file(aside / "sim3.json", sim3_json(outcome.alignment));
     write_cameras(aside, epochs.before, epochs.after, t2_from_t1);
-    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes);
+    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances);
+    write_change_list(aside, instances, epochs.before, epochs.after, changes);
     stage.advance(0.2);
     write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes);
     stage.advance(0.4);
@@ -158,6 +171,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   if (options.page) {
     epochs = {};
     changes = {};
+    instances = {};
     log.run("report page", [&](ProgressStage& stage) {
       const ReportInput input = read_results(aside);
       stage.advance(0.5);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "vggtcd/change/free_space.h"
+#include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/pipeline/alignment.h"
 #include "vggtcd/report/report_page.h"
@@ -35,6 +36,7 @@ struct DetectOptions {
   ChangeMethod change_method = ChangeMethod::kAuto;
   ChangeOptions change;
   FreeSpaceOptions free_space;
+  InstanceOptions instances;
   bool overlays = true;
   bool page = true;
   ReportOptions report;
@@ -49,6 +51,7 @@ struct DetectOptions {
           "auto: free_space with --method robust and for photos without a network, else distance.");
     field("change", self.change, "");
     field("free_space", self.free_space, "");
+    field("instances", self.instances, "");
     field("overlays", self.overlays, "Write overlays/: each photo beside its heat map.");
     field("page", self.page, "Write report.html: everything in one page.");
     field("report", self.report, "");
@@ -64,6 +67,7 @@ struct DetectOutcome {
   int64_t points_t1 = 0, changed_t1 = 0;
   int64_t points_t2 = 0, changed_t2 = 0;
   int64_t unobserved_t1 = 0, unobserved_t2 = 0;  // of the points; known with free-space votes only
+  int64_t removed = 0, added = 0, moved = 0;     // things
 };
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress);

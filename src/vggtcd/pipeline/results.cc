@@ -204,7 +204,8 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
 }
 
 void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
-                      const Reconstruction& after, const ChangeSet& changes) {
+                      const Reconstruction& after, const ChangeSet& changes,
+                      const ChangeInstances& instances) {
   const auto shape = [](const Reconstruction& r) {
     return std::vector<int64_t>{r.num_frames(), r.height, r.width};
   };
@@ -222,6 +223,8 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
     writer.add<uint8_t>("label_t1", shape(before), label_t1);
     writer.add<uint8_t>("label_t2", shape(after), label_t2);
   }
+  writer.add<int32_t>("instance_t1", shape(before), instances.id_t1);
+  writer.add<int32_t>("instance_t2", shape(after), instances.id_t2);
   writer.finish();
 }
 

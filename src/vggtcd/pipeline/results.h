@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/pipeline/alignment.h"
@@ -33,9 +34,11 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
                       const Sim3& t2_from_epoch, const EpochChange& change,
                       const ChangeSet& changes);
 
-// change.npz: score_t1, score_t2 f32, changed_t1, changed_t2 bool, all [S, H, W].
+// change.npz: score, changed, instance, and with labels label and confidence; all [S, H, W] of
+// either epoch.
 void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
-                      const Reconstruction& after, const ChangeSet& changes);
+                      const Reconstruction& after, const ChangeSet& changes,
+                      const ChangeInstances& instances);
 
 // One PNG per photo into `directory`, named like the photo.
 void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,

@@ -146,6 +146,9 @@ ReportInput read_results(const fs::path& directory) {
   ReportInput input;
   input.summary = read_json_file(summary_path);
   if (fs::exists(directory / "sim3.json")) input.sim3 = read_json_file(directory / "sim3.json");
+  if (const fs::path list = directory / "changes.json"; fs::exists(list)) {
+    input.changes = json_member(read_json_file(list), "changes", list.string());
+  }
   const Json& change = json_member(input.summary, "change", summary_path.string());
   input.extent_u = positive_member(change, "scene_extent_u", summary_path);
   input.threshold_u = positive_member(change, "threshold_u", summary_path);

@@ -87,6 +87,14 @@ TEST(ReadResults, PhotosAreTheLeftPartsOfTheOverlays) {
   EXPECT_EQ(input.before.image(0).width, 0);  // it has no overlay
 }
 
+TEST(ReadResults, TheListOfChangesIsTakenAsItIs) {
+  const Results results;
+  EXPECT_TRUE(read_results(results.directory.path()).changes.is_null());
+  const Json list = Json::array({{{"id", 1}, {"class", "added"}}});
+  write_json_file(results.directory / "changes.json", {{"changes", list}});
+  EXPECT_EQ(read_results(results.directory.path()).changes, list);
+}
+
 TEST(ReadResults, WhatIsMissingOrDoesNotFitIsNamed) {
   const TemporaryDirectory empty;
   EXPECT_INPUT_ERROR(read_results(empty.path()), "no summary.json");

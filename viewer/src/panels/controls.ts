@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The panel beside the 3D view.
 import { kMaps, type MapName } from '../colormap';
-import { hasLabels, type Cloud, type Report } from '../data';
+import { hasLabels, type Change, type Cloud, type Report } from '../data';
 import { checkbox, h, segmented } from '../dom';
-import { count, percent, words } from '../format';
+import { count, number, percent, words } from '../format';
 import { largestRegions } from '../regions';
 import { changedTest, type State, type Store } from '../store';
 import { makeAnswers } from './answers';
@@ -25,12 +25,19 @@ export interface Actions {
 
 const diagonal = (size: readonly number[]): number => Math.hypot(...size);
 
+function volumeOf(change: Change, unit: string): string {
+  if (change.volume_u3 === undefined) return '';
+  const sigma = change.volume_sigma_u3 === undefined ? '' : ` ± ${number(change.volume_sigma_u3, 1)}`;
+  return `${number(change.volume_u3, 2)}${sigma} ${unit}³`;
+}
+
 // The places of change: the result's own list if it has one, else groups of changed points.
 function findPlaces(report: Report, clouds: Cloud[], state: State): Place[] {
   if (report.changes) {
     return report.changes.slice(0, 200).map((change, i) => ({
       title: `${i + 1}. ${words(change.class ?? change.epoch ?? 'change')}`,
-      detail: [change.name ?? '', change.share === undefined ? '' : percent(change.share)].filter(Boolean).join(' · '),
+      detail: [change.name ?? '', volumeOf(change, report.unit),
+        change.share === undefined ? '' : percent(change.share)].filter(Boolean).join(' · '),
       kind: change.class ?? change.epoch ?? '', center: change.center, size: diagonal(change.size),
     }));
   }

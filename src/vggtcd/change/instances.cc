@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+// Changes as things: connected regions of changed points, measured, paired and ranked.
+#include "vggtcd/change/instances.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/voxel_components.h"
+
+namespace vggtcd {
+namespace {
+
+constexpr size_t kBestPhotos = 3;
+constexpr size_t kCarvingPhotos =
+    8;  // photos that look through the box, those that show most of it
+constexpr int kCellsAcross = 32;
+
+struct Pixel {
+  int frame, u, v;
+};
+Pixel pixel_at(const Reconstruction& epoch, uint32_t pixel) {
+  const size_t per_frame = epoch.pixels_per_frame();
+  const int in_frame = static_cast<int>(pixel % per_frame);
+  return {static_cast<int>(pixel / per_frame), in_frame % epoch.width, in_frame / epoch.width};
+}
+
+// The changed points of one epoch, and what is found in them.
+class EpochRegions {
+ public:
+  EpochRegions(const Reconstruction& epoch, const Sim3& t2_from_epoch, const EpochChange& change,
+               std::vector<PosedView> others, const ChangeSet& changes,
+               const InstanceOptions& options)
+      : epoch_(epoch),
+        change_(change),
+        views_(posed_views(epoch, t2_from_epoch)),
+        others_(std::move(others)) {
+    collect(t2_from_epoch, changes);
+    voxel_size_ = options.link_fraction * changes.scene_extent_u;
+    components_ = connected_components(positions_, voxel_size_, options.min_voxel_points);
+    position_sigma_u_ = std::max(voxel_size_ / std::sqrt(12.0), changes.surface_sigma_u);
+    margin_u_ = changes.surface_sigma_u;
+    group();
+    const double min_size = options.min_size_fraction * changes.scene_extent_u;
+    const Eigen::Vector3f mean = mean_color(epoch);
+    std::vector<std::optional<InstancePart>> parts(members_.size());
+    parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
+      const auto& members = members_[static_cast<size_t>(i)];
+      if (members.size() < static_cast<size_t>(options.min_instance_points)) return;
+      InstancePart part = measure(members, mean);
+      if (part.box.size[0] >= min_size) parts[static_cast<size_t>(i)] = std::move(part);
+    });
+    for (size_t i = 0; i < parts.size(); ++i) {
+      if (!parts[i]) continue;
+      parts_.push_back(std::move(*parts[i]));
+      kept_.push_back(i);
+    }
+  }
+
+  const std::vector<InstancePart>& parts() const { return parts_; }
+
+  // Writes the id of part i, ids[i], to its pixels.
+  std::vector<int32_t> id_map(const std::vector<int32_t>& ids) const {
+    std::vector<int32_t> map(epoch_.num_pixels(), 0);
+    for (size_t i = 0; i < kept_.size(); ++i) {
+      for (const uint32_t member : members_[kept_[i]]) map[pixels_[member]] = ids[i];
+    }
+    return map;
+  }
+
+ private:
+  void collect(const Sim3& t2_from_epoch, const ChangeSet& changes) {
+    for (int frame = 0; frame < epoch_.num_frames(); ++frame) {
+      const PixelRays rays(epoch_.views[static_cast<size_t>(frame)], t2_from_epoch);
+      size_t pixel = static_cast<size_t>(frame) * epoch_.pixels_per_frame();
+      for (int v = 0; v < epoch_.height; ++v) {
+        for (int u = 0; u < epoch_.width; ++u, ++pixel) {
+          if (!(epoch_.depth[pixel] > 0) || !changes.changed(change_, pixel)) continue;
+          positions_.push_back(rays.point(u, v, epoch_.depth[pixel]));
+          pixels_.push_back(static_cast<uint32_t>(pixel));
+        }
+      }
+    }
+  }
+
+  void group() {
+    members_.resize(static_cast<size_t>(components_.num_components));
+    for (uint32_t i = 0; i < positions_.size(); ++i) {
+      if (components_.component[i] >= 0) {
+        members_[static_cast<size_t>(components_.component[i])].push_back(i);
+      }
+    }
+  }
+
+  InstancePart measure(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
+    InstancePart part;
+    part.pixels = static_cast<int64_t>(members.size());
+    part.box = principal_box(voxel_means(members));
+    part.colors = colors(members, mean);
+    for (const uint32_t i : members) part.confidence += confidence_of(pixels_[i]);
+    part.confidence /= static_cast<double>(members.size());
+
+    std::vector<InstancePhoto> photos = photos_of(members);
+    std::vector<PosedView> own;
+    for (size_t k = 0; k < std::min(kCarvingPhotos, photos.size()); ++k) {
+      own.push_back(views_[static_cast<size_t>(photos[k].frame)]);
+    }
+    photos.resize(std::min(kBestPhotos, photos.size()));
+    part.photos = std::move(photos);
+
+    const ChangedSpace space =
+        changed_space(part.box, own, others_that_see(part.box.center), margin_u_, kCellsAcross);
+    part.volume_u3 = space.volume_u3;
+    part.box = space.box;
+    part.surface_u2 = surface(members);
+    // A body whose surface moves by sigma: dV = S sigma; of one radius r, dS / S = 2 sigma / r.
+    const double radius = std::max(voxel_size_, std::cbrt(part.volume_u3));
+    part.volume_sigma_u3 = part.surface_u2 * position_sigma_u_;
+    part.surface_sigma_u2 = part.surface_u2 * 2 * position_sigma_u_ / radius;
+    return part;
+  }
+
+  // Evenly chosen among those whose photo contains the point.
+  std::vector<PosedView> others_that_see(const Eigen::Vector3d& x) const {
+    std::vector<PosedView> seeing, chosen;
+    for (const PosedView& view : others_) {
+      const Eigen::Vector3d in_camera = view.camera_from_t2 * x;
+      if (!(in_camera.z() > 0)) continue;
+      const Eigen::Vector2d uv = view.pinhole.project(in_camera);
+      if (view.pinhole.contains(uv.x(), uv.y())) seeing.push_back(view);
+    }
+    const size_t count = std::min(kCarvingPhotos, seeing.size());
+    for (size_t k = 0; k < count; ++k) chosen.push_back(seeing[k * seeing.size() / count]);
+    return chosen;
+  }
+
+  double confidence_of(uint32_t pixel) const {
+    return change_.confidence.empty() ? 1.0 : static_cast<double>(change_.confidence[pixel]);
+  }
+
+  // One point per voxel, so that near photos do not outvote far ones.
+  std::vector<Eigen::Vector3f> voxel_means(const std::vector<uint32_t>& members) const {
+    std::vector<uint32_t> order = members;
+    std::ranges::stable_sort(order, {}, [&](uint32_t i) { return components_.voxel[i]; });
+    std::vector<Eigen::Vector3f> means;
+    for (size_t begin = 0; begin < order.size();) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      size_t end = begin;
+      for (; end < order.size() && components_.voxel[order[end]] == components_.voxel[order[begin]];
+           ++end) {
+        sum += positions_[order[end]].cast<double>();
+      }
+      means.push_back((sum / static_cast<double>(end - begin)).cast<float>());
+      begin = end;
+    }
+    return means;
+  }
+
+  ColorHistogram colors(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
+    ColorSum sum;
+    for (const uint32_t i : members) sum.add(&epoch_.color[3 * size_t{pixels_[i]}], mean);
+    return sum.normalized();
+  }
+
+  std::vector<InstancePhoto> photos_of(const std::vector<uint32_t>& members) const {
+    std::vector<InstancePhoto> photos;  // members are in pixel order, so photo by photo
+    for (const uint32_t i : members) {
+      const int frame = pixel_at(epoch_, pixels_[i]).frame;
+      if (photos.empty() || photos.back().frame != frame) photos.push_back({frame, 0, 0});
+      ++photos.back().pixels;
+      photos.back().evidence += confidence_of(pixels_[i]);
+    }
+    std::ranges::stable_sort(photos, std::greater{}, &InstancePhoto::evidence);
+    return photos;
+  }
+
+  // The area that the photos see: per voxel the mean over the photos that show it.
+  double surface(const std::vector<uint32_t>& members) const {
+    std::vector<uint32_t> order = members;
+    std::ranges::stable_sort(order, {}, [&](uint32_t i) { return components_.voxel[i]; });
+    double total = 0;
+    for (size_t begin = 0; begin < order.size();) {
+      double area = 0;
+      int photos = 0, last_frame = -1;
+      size_t end = begin;
+      for (; end < order.size() && components_.voxel[order[end]] == components_.voxel[order[begin]];
+           ++end) {
+        const Pixel at = pixel_at(epoch_, pixels_[order[end]]);
+        area += pixel_area(views_[static_cast<size_t>(at.frame)], at.u, at.v);
+        photos += at.frame != last_frame ? 1 : 0;
+        last_frame = at.frame;
+      }
+      total += area / photos;
+      begin = end;
+    }
+    return total;
+  }
+
+  const Reconstruction& epoch_;
+  const EpochChange& change_;
+  std::vector<PosedView> views_, others_;
+  double voxel_size_ = 0, position_sigma_u_ = 0, margin_u_ = 0;
+  std::vector<Eigen::Vector3f> positions_;  // of the changed points, T2, in pixel order
+  std::vector<uint32_t> pixels_;
+  VoxelComponents components_;
+  std::vector<std::vector<uint32_t>> members_;  // points of each component, in pixel order
+  std::vector<InstancePart> parts_;
+  std::vector<size_t> kept_;  // component of each part
+};
+
+// How well two things agree; 0 if they are not the same thing.
+double agreement(const InstancePart& a, const InstancePart& b, const InstanceOptions& options) {
+  double shape = 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double ratio =
+        std::min(a.box.size[axis], b.box.size[axis]) / std::max(a.box.size[axis], b.box.size[axis]);
+    // The shortest edge is the depth of what could be seen, which depends on the photos.
+    if (axis < 2 && ratio < options.move_shape_ratio) return 0;
+    shape *= ratio;
+  }
+  const double colors = histogram_intersection(a.colors, b.colors);
+  return colors < options.move_color_overlap ? 0 : std::cbrt(shape) * colors;
+}
+
+struct Pair {
+  size_t removed, added;
+  double agreement;
+};
+
+// The pairs of things that moved, each thing at most once, best agreement first.
+std::vector<Pair> match_moved(const std::vector<InstancePart>& removed,
+                              const std::vector<InstancePart>& added,
+                              const InstanceOptions& options) {
+  std::vector<Pair> candidates, pairs;
+  for (size_t r = 0; r < removed.size(); ++r) {
+    for (size_t a = 0; a < added.size(); ++a) {
+      const double value = agreement(removed[r], added[a], options);
+      if (value > 0) candidates.push_back({r, a, value});
+    }
+  }
+  std::ranges::stable_sort(candidates, std::greater{}, &Pair::agreement);
+  std::vector<bool> removed_taken(removed.size()), added_taken(added.size());
+  for (const Pair& pair : candidates) {
+    if (removed_taken[pair.removed] || added_taken[pair.added]) continue;
+    removed_taken[pair.removed] = added_taken[pair.added] = true;
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+}  // namespace
+
+void InstanceOptions::validate() const {
+  check_field(link_fraction > 0, "link_fraction", link_fraction, "a positive number");
+  check_field(min_voxel_points >= 1, "min_voxel_points", min_voxel_points, "at least 1");
+  check_field(min_size_fraction >= 0, "min_size_fraction", min_size_fraction, "at least 0");
+  check_field(min_instance_points >= 1, "min_instance_points", min_instance_points, "at least 1");
+  check_field(move_shape_ratio > 0 && move_shape_ratio <= 1, "move_shape_ratio", move_shape_ratio,
+              "a number in (0, 1]");
+  check_field(move_color_overlap > 0 && move_color_overlap <= 1, "move_color_overlap",
+              move_color_overlap, "a number in (0, 1]");
+}
+
+std::span<const EnumName<InstanceClass>> enum_names(InstanceClass) {
+  static constexpr EnumName<InstanceClass> kNames[] = {{InstanceClass::kRemoved, "removed"},
+                                                       {InstanceClass::kAdded, "added"},
+                                                       {InstanceClass::kMoved, "moved"}};
+  return kNames;
+}
+
+double ChangeInstance::confidence() const {
+  if (before && after) return 0.5 * (before->confidence + after->confidence);
+  return main().confidence;
+}
+
+ChangeInstances find_instances(const Reconstruction& before, const Reconstruction& after,
+                               const Sim3& t2_from_t1, const ChangeSet& changes,
+                               const InstanceOptions& options) {
+  options.validate();
+  const EpochRegions t1(before, t2_from_t1, changes.t1, posed_views(after, {}), changes, options);
+  const EpochRegions t2(after, {}, changes.t2, posed_views(before, t2_from_t1), changes, options);
+
+  // Which part of either epoch each instance has; -1: none.
+  struct Draft {
+    ChangeInstance instance;
+    int64_t part_t1 = -1, part_t2 = -1;
+  };
+  std::vector<Draft> drafts;
+  std::vector<bool> moved_t1(t1.parts().size()), moved_t2(t2.parts().size());
+  for (const Pair& pair : match_moved(t1.parts(), t2.parts(), options)) {
+    moved_t1[pair.removed] = moved_t2[pair.added] = true;
+    drafts.push_back({{InstanceClass::kMoved, t1.parts()[pair.removed], t2.parts()[pair.added]},
+                      static_cast<int64_t>(pair.removed),
+                      static_cast<int64_t>(pair.added)});
+  }
+  for (size_t i = 0; i < t1.parts().size(); ++i) {
+    if (moved_t1[i]) continue;
+    drafts.push_back({{InstanceClass::kRemoved, t1.parts()[i], {}}, static_cast<int64_t>(i), -1});
+  }
+  for (size_t i = 0; i < t2.parts().size(); ++i) {
+    if (moved_t2[i]) continue;
+    drafts.push_back({{InstanceClass::kAdded, {}, t2.parts()[i]}, -1, static_cast<int64_t>(i)});
+  }
+  std::ranges::stable_sort(drafts, std::greater{},
+                           [](const Draft& draft) { return draft.instance.rank(); });
+
+  ChangeInstances result;
+  result.voxel_size_u = options.link_fraction * changes.scene_extent_u;
+  std::vector<int32_t> ids_t1(t1.parts().size()), ids_t2(t2.parts().size());
+  for (Draft& draft : drafts) {
+    result.instances.push_back(std::move(draft.instance));
+    const int32_t id = static_cast<int32_t>(result.instances.size());
+    if (draft.part_t1 >= 0) ids_t1[static_cast<size_t>(draft.part_t1)] = id;
+    if (draft.part_t2 >= 0) ids_t2[static_cast<size_t>(draft.part_t2)] = id;
+  }
+  result.id_t1 = t1.id_map(ids_t1);
+  result.id_t2 = t2.id_map(ids_t2);
+  return result;
+}
+
+}  // namespace vggtcd
