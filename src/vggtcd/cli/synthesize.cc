@@ -16,7 +16,7 @@ struct Arguments {
 
 void run(const Arguments& arguments, ProgressSink& progress) {
   if (arguments.list) {
-    for (const std::string_view name : scene_names()) fmt::print("{}\n", name);
+    for (const std::string_view name : all_scene_names()) fmt::print("{}\n", name);
     return;
   }
   if (arguments.directory.empty()) {

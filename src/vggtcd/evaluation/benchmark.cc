@@ -2,13 +2,16 @@
 // Running methods on scenes.
 #include "vggtcd/evaluation/benchmark.h"
 
-#include <algorithm>
-#include <chrono>
-#include <cmath>
+#include <fmt/format.h>
 
-#include "vggtcd/change/nearest_distance.h"
+#include <algorithm>
+#include <charconv>
+#include <iterator>
+
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/baselines/rivals.h"
+#include "vggtcd/evaluation/benchmark_summary.h"
+#include "vggtcd/evaluation/kept_rivals.h"
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
 #include "vggtcd/evaluation/wat.h"
@@ -39,19 +42,15 @@ TrajectoryErrors errors_of(const RegistrationProblem& problem, const Sim3& t2_fr
                              truth);
 }
 
-MethodOutcome run_method(const RegistrationMethod& method, const RegistrationProblem& problem,
-                         const BitemporalTrajectory& truth) {
+MethodOutcome outcome_of(const std::string& method, const MethodAnswer& answer,
+                         const RegistrationProblem& problem, const BitemporalTrajectory& truth) {
   MethodOutcome outcome;
-  outcome.method = method.name;
-  if (!method.run) {
-    outcome.failure = method.absent_because;
-    return outcome;
-  }
+  outcome.method = method;
+  outcome.failure = answer.failure;
+  if (!answer.failure.empty()) return outcome;
+  outcome.seconds = answer.seconds;
+  outcome.t2_from_t1 = answer.t2_from_t1;
   try {
-    const auto start = std::chrono::steady_clock::now();
-    outcome.t2_from_t1 = method.run(problem);
-    outcome.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     const BitemporalTrajectory mapped = register_trajectory(
         poses_of(problem.before.views), poses_of(problem.after.views), outcome.t2_from_t1);
     outcome.errors = evaluate_trajectory(mapped, truth);
@@ -66,33 +65,41 @@ MethodOutcome run_method(const RegistrationMethod& method, const RegistrationPro
 
 std::vector<MethodOutcome> run_methods(const RegistrationProblem& problem,
                                        const BitemporalTrajectory& truth, bool rivals,
-                                       ProgressSink& progress) {
+                                       const std::filesystem::path& kept, ProgressSink& progress) {
   if (rivals && rivals_available()) load_rivals();
+  const uint64_t hash = hash_of_epochs(problem);
   std::vector<MethodOutcome> outcomes;
   for (const RegistrationMethod& method : registration_methods()) {
     if (method.rival && !rivals) continue;
     ProgressStage stage(progress, method.title);
-    outcomes.push_back(run_method(method, problem, truth));
+    MethodAnswer answer;
+    if (method.run) {
+      answer = run_or_recall(method, problem, hash, method.rival ? kept : std::filesystem::path());
+    } else {
+      answer.failure = method.absent_because;
+    }
+    outcomes.push_back(outcome_of(method.name, answer, problem, truth));
   }
   return outcomes;
 }
 
-const MethodOutcome* find_method(const std::vector<MethodOutcome>& outcomes,
-                                 std::string_view name) {
-  for (const MethodOutcome& outcome : outcomes) {
-    if (outcome.method == name && outcome.failure.empty()) return &outcome;
-  }
-  return nullptr;
+AblationOutcome run_budget(int keyframes, const RegistrationProblem& problem,
+                           const BitemporalTrajectory& truth) {
+  const Sim3 coarse = align_coarse(problem.before, problem.after, problem.joint, {}).t2_from_t1;
+  const FineResult fine = align_fine(problem.before, problem.after, coarse, {});
+  return {keyframes, errors_of(problem, coarse, truth).ate_mean,
+          errors_of(problem, fine.t2_from_t1, truth).ate_mean,
+          std::string(enum_to_string(fine.verdict))};
 }
 
-// The budgets of the paper's table of the fine stage; 0 stands for all frames.
-std::vector<AblationOutcome> run_ablation(const SyntheticScene& scene, const SceneTruth& truth,
-                                          const SimulatedPredictions& predictions,
-                                          const BitemporalTrajectory& true_poses) {
+std::vector<AblationOutcome> run_synthetic_ablation(const SyntheticScene& scene,
+                                                    const SceneTruth& truth,
+                                                    const RegistrationProblem& problem,
+                                                    const BitemporalTrajectory& true_poses) {
   const int frames_t1 = truth.of(Epoch::kT1).num_frames();
   const int frames_t2 = truth.of(Epoch::kT2).num_frames();
   std::vector<AblationOutcome> outcomes;
-  for (const int keyframes : {2, 3, 5, 7, 9, 15, 20, 50, 0}) {
+  for (const int keyframes : kAblationKeyframes) {
     const int count = keyframes == 0 ? std::max(frames_t1, frames_t2) : keyframes;
     if (keyframes >= std::min(frames_t1, frames_t2)) continue;  // the same as all
     JointReconstruction joint;
@@ -101,93 +108,65 @@ std::vector<AblationOutcome> run_ablation(const SyntheticScene& scene, const Sce
     joint.reconstruction =
         simulate_joint(scene, truth, joint.keyframes_t1, joint.keyframes_t2, ErrorModel{})
             .reconstruction;
-    const RegistrationProblem problem{predictions.t1.reconstruction, predictions.t2.reconstruction,
-                                      joint};
-    const Sim3 coarse = align_coarse(problem.before, problem.after, joint, {}).t2_from_t1;
-    const FineResult fine = align_fine(problem.before, problem.after, coarse, {});
-    outcomes.push_back({keyframes, errors_of(problem, coarse, true_poses).ate_mean,
-                        errors_of(problem, fine.t2_from_t1, true_poses).ate_mean,
-                        std::string(enum_to_string(fine.verdict))});
+    outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, true_poses));
   }
   return outcomes;
 }
 
-struct EpochPixels {
-  const EpochTruth& truth;
-  const EpochChange& change;
-};
-
-ChangeOutcome score_changes(const EpochPixels (&epochs)[2], const ChangeSet& changes,
-                            bool unseen_counted, bool every_pixel) {
-  ChangeOutcome outcome;
-  outcome.method = "nearest_distance";
-  outcome.unseen_counted = unseen_counted;
-  outcome.every_pixel = every_pixel;
-  ScoredPixels pixels;
-  int64_t unseen = 0, unseen_called = 0;
-  for (const auto& [truth, change] : epochs) {
-    for (size_t pixel = 0; pixel < truth.label.size(); ++pixel) {
-      const uint8_t label = truth.label[pixel];
-      if (label == kLabelVoid) continue;
-      float score = change.score[pixel];
-      if (std::isnan(score)) {
-        if (!every_pixel) continue;
-        score = -1;  // below every distance
-      }
-      if (!truth.other_looked[pixel]) {
-        if (label == kLabelUnchanged) {
-          ++unseen;
-          unseen_called += changes.changed(score) ? 1 : 0;
-        }
-        if (!unseen_counted) continue;
-      }
-      pixels.add(score, label == kLabelChanged);
-    }
-  }
-  outcome.scores = evaluate_changes(pixels, static_cast<float>(changes.threshold_u));
-  outcome.unseen_called_changed =
-      unseen > 0 ? static_cast<double>(unseen_called) / static_cast<double>(unseen) : 0;
-  return outcome;
-}
-
-std::vector<ChangeOutcome> run_changes(const RegistrationProblem& problem, const SceneTruth& truth,
-                                       const Sim3& t2_from_t1) {
-  const ChangeSet changes = detect_changes(problem.before, problem.after, t2_from_t1, {});
-  const EpochPixels epochs[] = {{truth.of(Epoch::kT1), changes.t1},
-                                {truth.of(Epoch::kT2), changes.t2}};
-  std::vector<ChangeOutcome> outcomes;
-  for (const bool every_pixel : {false, true}) {
-    for (const bool unseen_counted : {false, true}) {
-      outcomes.push_back(score_changes(epochs, changes, unseen_counted, every_pixel));
-    }
+// With the joint passes over other numbers of keyframes that are there as files.
+std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files,
+                                              const RegistrationProblem& problem,
+                                              const BitemporalTrajectory& truth,
+                                              ProgressSink& progress) {
+  std::vector<AblationOutcome> outcomes;
+  for (const int keyframes : kAblationKeyframes) {
+    const std::filesystem::path file = files / wat_joint_name(keyframes);
+    if (!std::filesystem::exists(file)) continue;
+    const JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
+    outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, truth));
   }
   return outcomes;
-}
-
-double changed_share_of(const SceneTruth& truth) {
-  int64_t changed = 0, surface = 0;
-  for (const EpochTruth& epoch : truth.epoch) {
-    for (size_t pixel = 0; pixel < epoch.label.size(); ++pixel) {
-      surface += epoch.object[pixel] != 0 ? 1 : 0;
-      changed += epoch.label[pixel] == kLabelChanged ? 1 : 0;
-    }
-  }
-  return static_cast<double>(changed) / static_cast<double>(std::max<int64_t>(1, surface));
 }
 
 }  // namespace
 
+std::vector<uint64_t> parse_seeds(const std::string& list) {
+  const auto number = [&](const std::string& text) {
+    uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size()) {
+      throw_error(ErrorCode::kUsage, "seeds: expected numbers such as 1,2,7 or 201-203, found '{}'",
+                  list);
+    }
+    return value;
+  };
+  std::vector<uint64_t> seeds;
+  for (size_t start = 0; start <= list.size();) {
+    const size_t comma = std::min(list.find(',', start), list.size());
+    const std::string part = list.substr(start, comma - start);
+    const size_t dash = std::min(part.find('-'), part.size());
+    const uint64_t first = number(part.substr(0, dash));
+    const uint64_t last = dash < part.size() ? number(part.substr(dash + 1)) : first;
+    check_field(first <= last && last - first < 1000, "seeds", list,
+                "ranges from a smaller to a larger number, of at most 1000");
+    for (uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
+    start = comma + 1;
+  }
+  return seeds;
+}
+
 void BenchmarkOptions::validate() const {
-  check_field(seeds >= 1, "seeds", seeds, "at least 1");
+  parse_seeds(seeds);
   check_field(frames == 0 || frames >= 4, "frames", frames, "0 or at least 4");
   check_field(width >= 32 && width % 2 == 0, "width", width, "even, at least 32");
   check_field(keyframes >= 2, "keyframes", keyframes, "at least 2");
 }
 
 SceneOutcome run_synthetic_scene(const std::string& name, uint64_t seed,
-                                 const BenchmarkOptions& options, ProgressSink& progress) {
+                                 const BenchmarkOptions& options, const std::filesystem::path& kept,
+                                 ProgressSink& progress) {
   options.validate();
-  const SyntheticScene scene = make_scene(name, seed);
+  const SyntheticScene scene = make_scene(name, seed, options.change);
   RenderOptions render_options;
   render_options.frames = options.frames;
   render_options.width = options.width;
@@ -206,38 +185,47 @@ SceneOutcome run_synthetic_scene(const std::string& name, uint64_t seed,
   outcome.outdoor = scene.outdoor;
   outcome.scale = scene.scale_t2_from_t1;
   outcome.extent = truth.extent_m;
-  outcome.changed_share = changed_share_of(truth);
+  outcome.changed_share = changed_share(truth);
   outcome.true_centers_t1 = centers_of(true_poses.t1);
   outcome.true_centers_t2 = centers_of(true_poses.t2);
   outcome.best_fit_ate =
       errors_of(problem, best_t2_from_t1(truth, problem.before, problem.after), true_poses)
           .ate_mean;
-  outcome.methods = run_methods(problem, true_poses, options.rivals, progress);
+  outcome.methods = run_methods(problem, true_poses, options.rivals, kept, progress);
   if (options.ablation) {
     ProgressStage stage(progress, "keyframe ablation");
-    outcome.ablation = run_ablation(scene, truth, predictions, true_poses);
+    outcome.ablation = run_synthetic_ablation(scene, truth, problem, true_poses);
   }
-  if (const MethodOutcome* paper = find_method(outcome.methods, "paper")) {
-    ProgressStage stage(progress, "change");
-    outcome.changes = run_changes(problem, truth, paper->t2_from_t1);
+  for (const char* alignment : {"paper", "robust"}) {
+    const MethodOutcome* method = find_outcome(outcome, alignment);
+    if (method == nullptr) continue;
+    ProgressStage stage(progress, fmt::format("change, alignment {}", alignment));
+    ChangeBenchmark change = benchmark_changes(truth, problem.before, problem.after,
+                                               method->t2_from_t1, alignment, progress);
+    std::move(change.changes.begin(), change.changes.end(), std::back_inserter(outcome.changes));
+    std::move(change.instances.begin(), change.instances.end(),
+              std::back_inserter(outcome.instances));
   }
   return outcome;
 }
 
 SceneOutcome run_wat_scene(const std::string& name, const std::filesystem::path& data,
                            const std::filesystem::path& predictions,
-                           const BenchmarkOptions& options, ProgressSink& progress) {
+                           const BenchmarkOptions& options, const std::filesystem::path& kept,
+                           ProgressSink& progress) {
   const std::filesystem::path files = predictions / name;
   const Reconstruction before = read_reconstruction(files / "t1.npz", progress);
   const Reconstruction after = read_reconstruction(files / "t2.npz", progress);
   const JointReconstruction joint = read_joint(files / "joint.npz", before, after, progress);
+  const RegistrationProblem problem{before, after, joint};
   const BitemporalTrajectory truth = read_wat_truth(data / name, before, after);
   SceneOutcome outcome;
   outcome.scene = name;
   outcome.true_centers_t1 = centers_of(truth.t1);
   outcome.true_centers_t2 = centers_of(truth.t2);
   outcome.scale = 0;  // not known
-  outcome.methods = run_methods({before, after, joint}, truth, options.rivals, progress);
+  outcome.methods = run_methods(problem, truth, options.rivals, kept, progress);
+  if (options.ablation) outcome.ablation = run_wat_ablation(files, problem, truth, progress);
   return outcome;
 }
 

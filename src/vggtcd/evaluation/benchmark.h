@@ -3,23 +3,23 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
-#include "vggtcd/evaluation/change_metrics.h"
-#include "vggtcd/evaluation/synthetic/predict.h"
-#include "vggtcd/evaluation/synthetic/render.h"
+#include "vggtcd/evaluation/change_benchmark.h"
+#include "vggtcd/evaluation/synthetic/scene.h"
 #include "vggtcd/evaluation/trajectory_metrics.h"
+#include "vggtcd/geometry/sim3.h"
 
 namespace vggtcd {
 
 struct BenchmarkOptions {
   std::string scenes = "all";
-  int seeds = 1;
-  uint64_t first_seed = 1;
+  std::string seeds = "1";
+  SceneChange change = SceneChange::kScene;
   int frames = 24;
   int width = 160;
   int keyframes = 5;
@@ -27,17 +27,26 @@ struct BenchmarkOptions {
   bool ablation = true;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
-    field("scenes", self.scenes, "comma-separated names, or all");
-    field("seeds", self.seeds, "synthetic: this many variants of each scene, at least 1");
-    field("first_seed", self.first_seed, "synthetic: the first variant");
+    field("scenes", self.scenes,
+          "comma-separated names, or all: of the synthetic suite the eleven scenes");
+    field("seeds", self.seeds, "synthetic: variants of each scene, e.g. 1,2,7 or 201-203");
+    field("change", self.change,
+          "synthetic: scene: what changes is the scene's own list; none: nothing changes but light "
+          "and walk");
     field("frames", self.frames, "synthetic: frames per epoch; 0: each scene's own number");
     field("width", self.width, "synthetic: width of the depth maps in px");
-    field("keyframes", self.keyframes, "synthetic: keyframes per epoch in the joint pass");
+    field("keyframes", self.keyframes, "keyframes per epoch in the joint pass");
     field("rivals", self.rivals, "also run FGR, RANSAC+ICP and Scale+ICP");
-    field("ablation", self.ablation, "synthetic: also vary the number of keyframes");
+    field("ablation", self.ablation, "also vary the number of keyframes");
   };
   void validate() const;
 };
+
+// The seeds that a list names: "1,2,7", "201-203". Throws Error{kUsage}.
+std::vector<uint64_t> parse_seeds(const std::string& list);
+
+// The budgets of the paper's table of the fine stage; 0 stands for all frames.
+inline constexpr int kAblationKeyframes[] = {2, 3, 5, 7, 9, 15, 20, 50, 0};
 
 struct MethodOutcome {
   std::string method;   // registration_methods() name
@@ -55,17 +64,6 @@ struct AblationOutcome {
   std::string verdict;  // of the fine stage
 };
 
-// Change detection with the paper's alignment and distance. `unseen_counted`: pixels that the other
-// epoch never saw are evaluated too. `every_pixel`: pixels without evidence (low confidence) count
-// as called unchanged; else they are left out.
-struct ChangeOutcome {
-  std::string method;
-  bool unseen_counted = false, every_pixel = false;
-  ChangeScores scores;
-  double unseen_called_changed =
-      0;  // share of unchanged, never-seen pixels that are called changed
-};
-
 struct SceneOutcome {
   std::string scene;
   uint64_t seed = 0;
@@ -77,28 +75,41 @@ struct SceneOutcome {
   std::vector<MethodOutcome> methods;
   std::vector<AblationOutcome> ablation;
   std::vector<ChangeOutcome> changes;
+  std::vector<InstanceOutcome> instances;
   std::vector<Eigen::Vector3d> true_centers_t1, true_centers_t2;
 };
 
 // One scene: renders, predicts, registers, measures. Deterministic but for the seconds (and for
-// rivals, see docs/benchmark.md).
+// rivals, see docs/benchmark.md). Rivals' answers about the same points are taken from `kept`
+// (kept_rivals.h) where they are there, and kept there; empty: computed always.
 SceneOutcome run_synthetic_scene(const std::string& scene, uint64_t seed,
-                                 const BenchmarkOptions& options, ProgressSink& progress);
+                                 const BenchmarkOptions& options, const std::filesystem::path& kept,
+                                 ProgressSink& progress);
 
 // One scene from files (protocol of the paper's WAT benchmark, docs/benchmark.md): the true poses
-// from data/SCENE/sparse/0, predictions from predictions/SCENE/{t1,t2,joint}.npz.
+// from data/SCENE/sparse/0, predictions from predictions/SCENE/{t1,t2,joint}.npz; for the ablation
+// joint_K.npz and joint_all.npz where they exist.
 SceneOutcome run_wat_scene(const std::string& scene, const std::filesystem::path& data,
                            const std::filesystem::path& predictions,
-                           const BenchmarkOptions& options, ProgressSink& progress);
+                           const BenchmarkOptions& options, const std::filesystem::path& kept,
+                           ProgressSink& progress);
 
 // All scenes; finished ones are kept in out/scenes/*.json and not computed again when the options
-// are the same. Writes the report (benchmark_report.h).
+// are the same. Writes the report (benchmark_report.h), anew after every scene.
 std::vector<SceneOutcome> run_synthetic_suite(const std::filesystem::path& out,
                                               const BenchmarkOptions& options,
                                               ProgressSink& progress);
+
+// Where a WAT suite finds predictions. `predict`, if any, is called for every scene that is not
+// finished, before its files are read, to make those that are missing; `made_by` says by what.
+struct WatPredictions {
+  std::filesystem::path directory;
+  std::string made_by;
+  std::function<void(const std::string& scene)> predict;
+};
 std::vector<SceneOutcome> run_wat_suite(const std::filesystem::path& out,
                                         const std::filesystem::path& data,
-                                        const std::filesystem::path& predictions,
+                                        const WatPredictions& predictions,
                                         const BenchmarkOptions& options, ProgressSink& progress);
 
 }  // namespace vggtcd

@@ -2,6 +2,7 @@
 // Both directions of the benchmark's JSON.
 #include "vggtcd/evaluation/benchmark_json.h"
 
+#include <concepts>
 #include <limits>
 
 #include "vggtcd/io/sim3_file.h"
@@ -9,69 +10,12 @@
 namespace vggtcd {
 namespace {
 
-// One list of members per struct serves both directions: io(json, name, member).
-struct Write {
-  Json& json;
-  template <typename T>
-  void operator()(const char* name, const T& value) const {
-    json[name] = encode(value);
-  }
-  template <typename T>
-  static Json encode(const T& value) {
-    return value;
-  }
-  static Json encode(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-  static Json encode(const Sim3& s);
-  template <typename T>
-  static Json encode(const std::vector<T>& values) {
-    Json list = Json::array();
-    for (const T& value : values) list.push_back(encode(value));
-    return list;
-  }
-  static Json encode(const TrajectoryErrors& v) { return object(v); }
-  static Json encode(const ChangeScores& v) { return object(v); }
-  static Json encode(const MethodOutcome& v) { return object(v); }
-  static Json encode(const AblationOutcome& v) { return object(v); }
-  static Json encode(const ChangeOutcome& v) { return object(v); }
-  template <typename T>
-  static Json object(const T& value);
-};
+template <typename T, typename U>
+concept Like = std::same_as<std::remove_const_t<T>, U>;
 
-struct Read {
-  const Json& json;
-  template <typename T>
-  void operator()(const char* name, T& value) const {
-    decode(json.at(name), value);
-  }
-  template <typename T>
-  static void decode(const Json& from, T& value) {
-    from.get_to(value);
-  }
-  // A best threshold of minus infinity is null in JSON.
-  static void decode(const Json& from, float& value) {
-    value = from.is_null() ? -std::numeric_limits<float>::infinity() : from.get<float>();
-  }
-  static void decode(const Json& from, Eigen::Vector3d& v) {
-    for (int k = 0; k < 3; ++k) v[k] = from.at(static_cast<size_t>(k)).get<double>();
-  }
-  static void decode(const Json& from, Sim3& s);
-  template <typename T>
-  static void decode(const Json& from, std::vector<T>& values) {
-    values.clear();
-    for (const Json& each : from) decode(each, values.emplace_back());
-  }
-  static void decode(const Json& from, TrajectoryErrors& v) { object(from, v); }
-  static void decode(const Json& from, ChangeScores& v) { object(from, v); }
-  static void decode(const Json& from, MethodOutcome& v) { object(from, v); }
-  static void decode(const Json& from, AblationOutcome& v) { object(from, v); }
-  static void decode(const Json& from, ChangeOutcome& v) { object(from, v); }
-  template <typename T>
-  static void object(const Json& from, T& value);
-};
-
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, TrajectoryErrors>
-void members(const Visit& io, T& v) {
+// Every struct has one list of members, which serves both directions: visit(name, member).
+template <Like<TrajectoryErrors> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("ate_mean", v.ate_mean);
   io("ate_rmse", v.ate_rmse);
   io("ate_median", v.ate_median);
@@ -83,9 +27,8 @@ void members(const Visit& io, T& v) {
   io("truth_from_predicted", v.truth_from_predicted);
 }
 
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, ChangeScores>
-void members(const Visit& io, T& v) {
+template <Like<ChangeScores> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("pixels", v.pixels);
   io("changed_pixels", v.changed_pixels);
   io("precision", v.precision);
@@ -93,12 +36,23 @@ void members(const Visit& io, T& v) {
   io("f1", v.f1);
   io("auprc", v.auprc);
   io("best_f1", v.best_f1);
+  io("false_alarms", v.false_alarms);
   io("best_threshold", v.best_threshold);
 }
 
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, MethodOutcome>
-void members(const Visit& io, T& v) {
+template <Like<InstanceScores> T, typename Visit>
+void members(T& v, const Visit& io) {
+  io("objects", v.objects);
+  io("found", v.found);
+  io("told_apart", v.told_apart);
+  io("small", v.small);
+  io("hardly_seen", v.hardly_seen);
+  io("reported", v.reported);
+  io("right", v.right);
+}
+
+template <Like<MethodOutcome> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("method", v.method);
   io("failure", v.failure);
   io("seconds", v.seconds);
@@ -108,28 +62,34 @@ void members(const Visit& io, T& v) {
   io("centers_t2", v.centers_t2);
 }
 
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, AblationOutcome>
-void members(const Visit& io, T& v) {
+template <Like<AblationOutcome> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("keyframes", v.keyframes);
   io("coarse_ate", v.coarse_ate);
   io("full_ate", v.full_ate);
   io("verdict", v.verdict);
 }
 
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, ChangeOutcome>
-void members(const Visit& io, T& v) {
+template <Like<ChangeOutcome> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("method", v.method);
+  io("alignment", v.alignment);
   io("unseen_counted", v.unseen_counted);
   io("every_pixel", v.every_pixel);
   io("scores", v.scores);
+  io("evidence", v.evidence);
   io("unseen_called_changed", v.unseen_called_changed);
 }
 
-template <typename Visit, typename T>
-requires std::is_same_v<std::remove_const_t<T>, SceneOutcome>
-void members(const Visit& io, T& v) {
+template <Like<InstanceOutcome> T, typename Visit>
+void members(T& v, const Visit& io) {
+  io("method", v.method);
+  io("alignment", v.alignment);
+  io("scores", v.scores);
+}
+
+template <Like<SceneOutcome> T, typename Visit>
+void members(T& v, const Visit& io) {
   io("scene", v.scene);
   io("seed", v.seed);
   io("outdoor", v.outdoor);
@@ -140,33 +100,69 @@ void members(const Visit& io, T& v) {
   io("methods", v.methods);
   io("ablation", v.ablation);
   io("changes", v.changes);
+  io("instances", v.instances);
   io("true_centers_t1", v.true_centers_t1);
   io("true_centers_t2", v.true_centers_t2);
 }
 
+struct NoVisit {
+  void operator()(const char*, const auto&) const {}
+};
 template <typename T>
-Json Write::object(const T& value) {
-  Json json = Json::object();
-  members(Write{json}, value);
-  return json;
+concept HasMembers = requires(T& value) {
+  members(value, NoVisit{});
+};
+
+template <typename T>
+constexpr bool kIsVector = false;
+template <typename T>
+constexpr bool kIsVector<std::vector<T>> = true;
+
+template <typename T>
+Json encode(const T& value) {
+  if constexpr (HasMembers<T>) {
+    Json json = Json::object();
+    members(value, [&](const char* name, const auto& member) { json[name] = encode(member); });
+    return json;
+  } else if constexpr (kIsVector<T>) {
+    Json json = Json::array();
+    for (const auto& each : value) json.push_back(encode(each));
+    return json;
+  } else if constexpr (std::same_as<T, Eigen::Vector3d>) {
+    return {value.x(), value.y(), value.z()};
+  } else if constexpr (std::same_as<T, Sim3>) {
+    return sim3_to_json(value);
+  } else {
+    return value;
+  }
 }
 
 template <typename T>
-void Read::object(const Json& from, T& value) {
-  members(Read{from}, value);
+void decode(const Json& json, T& value) {
+  if constexpr (HasMembers<T>) {
+    members(value, [&](const char* name, auto& member) { decode(json.at(name), member); });
+  } else if constexpr (kIsVector<T>) {
+    value.clear();
+    for (const Json& each : json) decode(each, value.emplace_back());
+  } else if constexpr (std::same_as<T, Eigen::Vector3d>) {
+    for (int k = 0; k < 3; ++k) value[k] = json.at(static_cast<size_t>(k)).get<double>();
+  } else if constexpr (std::same_as<T, Sim3>) {
+    value = sim3_from_json(json, "Sim(3)");
+  } else if constexpr (std::same_as<T, float>) {
+    // A best threshold of minus infinity is null in JSON.
+    value = json.is_null() ? -std::numeric_limits<float>::infinity() : json.get<float>();
+  } else {
+    json.get_to(value);
+  }
 }
-
-Json Write::encode(const Sim3& s) { return sim3_to_json(s); }
-
-void Read::decode(const Json& from, Sim3& s) { s = sim3_from_json(from, "Sim(3)"); }
 
 }  // namespace
 
-Json to_json(const SceneOutcome& outcome) { return Write::object(outcome); }
+Json to_json(const SceneOutcome& outcome) { return encode(outcome); }
 
 SceneOutcome scene_outcome_from_json(const Json& json) {
   SceneOutcome outcome;
-  Read::object(json, outcome);
+  decode(json, outcome);
   return outcome;
 }
 

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tables of the benchmark; plots are in benchmark_plots.cc.
+// Tables of registration; change is in change_tables.cc, plots in benchmark_plots.cc.
 #include "vggtcd/evaluation/benchmark_report.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "vggtcd/core/version.h"
 #include "vggtcd/evaluation/benchmark_json.h"
+#include "vggtcd/evaluation/benchmark_summary.h"
+#include "vggtcd/evaluation/change_tables.h"
 #include "vggtcd/evaluation/paper_numbers.h"
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/io/output_file.h"
@@ -16,97 +19,143 @@
 namespace vggtcd {
 namespace {
 
-const MethodOutcome* find(const SceneOutcome& scene, const std::string& method) {
-  for (const MethodOutcome& outcome : scene.methods) {
-    if (outcome.method == method) return &outcome;
+// The methods that any scene has a row for, with or without numbers.
+std::vector<RegistrationMethod> listed_methods(const std::vector<SceneOutcome>& scenes) {
+  std::vector<RegistrationMethod> listed;
+  for (RegistrationMethod& method : registration_methods()) {
+    const bool any = std::any_of(scenes.begin(), scenes.end(), [&](const SceneOutcome& scene) {
+      return std::any_of(scene.methods.begin(), scene.methods.end(),
+                         [&](const MethodOutcome& m) { return m.method == method.name; });
+    });
+    if (any) listed.push_back(std::move(method));
   }
-  return nullptr;
+  return listed;
 }
 
-// The smallest ATE of a scene.
-double best_ate(const SceneOutcome& scene) {
-  double best = 1e300;
-  for (const MethodOutcome& outcome : scene.methods) {
-    if (outcome.failure.empty()) best = std::min(best, outcome.errors.ate_mean);
-  }
-  return best;
+std::string cell(const SceneOutcome& scene, const RegistrationMethod& method,
+                 double (*value)(const MethodOutcome&), int digits, bool mark_best) {
+  if (!method.run) return " not yet |";
+  const MethodOutcome* outcome = find_outcome(scene, method.name);
+  if (outcome == nullptr) return " failed |";
+  const std::string number = fmt::format("{:.{}f}", value(*outcome), digits);
+  const bool best = mark_best && outcome->errors.ate_mean <= best_ate(scene);
+  return best ? fmt::format(" **{}** |", number) : fmt::format(" {} |", number);
 }
 
-std::string scene_title(const SceneOutcome& scene) {
-  return scene.seed == 0 ? scene.scene : fmt::format("{} #{}", scene.scene, scene.seed);
-}
-
-using Cell = std::string (*)(const MethodOutcome&, bool best);
-
-std::string table(const SuiteReport& report, const std::string& heading, Cell cell,
-                  double (*value)(const MethodOutcome&)) {
-  std::string out = "\n### " + heading + "\n\n| Method |";
-  for (const SceneOutcome& scene : report.scenes) out += " " + scene_title(scene) + " |";
-  out += " mean |\n|---|";
-  for (size_t k = 0; k <= report.scenes.size(); ++k) out += "---|";
-  out += "\n";
-  for (const RegistrationMethod& method : registration_methods()) {
-    std::string row = "| " + method.title + " |";
+std::string table(const SuiteReport& report, const std::string& heading, int digits,
+                  double (*value)(const MethodOutcome&), bool is_ate = false) {
+  const std::vector<RegistrationMethod> methods = listed_methods(report.scenes);
+  const bool floor = is_ate && report.suite == "synthetic";
+  std::string head = "| Scene |", rule = "|---|", last = "| **mean** |";
+  for (const RegistrationMethod& method : methods) {
+    head += " " + method.title + " |";
+    rule += "---|";
     double sum = 0;
     size_t count = 0;
-    std::string absent = method.absent_because;
-    bool any = false;
     for (const SceneOutcome& scene : report.scenes) {
-      const MethodOutcome* outcome = find(scene, method.name);
-      if (outcome == nullptr) {
-        row += " |";
-        continue;
-      }
-      any = true;
-      if (!outcome->failure.empty()) {
-        row += outcome->failure == absent ? " not yet |" : " failed |";
-        continue;
-      }
-      row += " " + cell(*outcome, outcome->errors.ate_mean <= best_ate(scene)) + " |";
+      const MethodOutcome* outcome = find_outcome(scene, method.name);
+      if (outcome == nullptr) continue;
       sum += value(*outcome);
       ++count;
     }
-    if (!any) continue;
     // A mean over some of the scenes would not compare with the others.
-    row += count == report.scenes.size()
-               ? fmt::format(" {:.3f} |\n", sum / static_cast<double>(count))
-               : std::string(" |\n");
-    out += row;
+    last += count == report.scenes.size()
+                ? fmt::format(" {:.{}f} |", sum / static_cast<double>(count), digits)
+                : std::string(" |");
   }
-  return out;
+  double floor_sum = 0;
+  std::string rows;
+  for (const SceneOutcome& scene : report.scenes) {
+    rows += "| " + scene_title(scene) + " |";
+    for (const RegistrationMethod& method : methods) {
+      rows += cell(scene, method, value, digits, is_ate);
+    }
+    if (floor) rows += fmt::format(" *{:.{}f}* |", scene.best_fit_ate, digits);
+    floor_sum += scene.best_fit_ate;
+    rows += "\n";
+  }
+  if (floor) {
+    head += " *best Sim(3)* |";
+    rule += "---|";
+    last +=
+        fmt::format(" *{:.{}f}* |", floor_sum / static_cast<double>(report.scenes.size()), digits);
+  }
+  return fmt::format("\n### {}\n\n{}\n{}\n{}{}\n", heading, head, rule, rows, last);
 }
 
-std::string floor_row(const SuiteReport& report) {
-  std::string row = "| *best Sim(3) for these passes* |";
-  double sum = 0;
-  for (const SceneOutcome& scene : report.scenes) {
-    row += fmt::format(" {:.3f} |", scene.best_fit_ate);
-    sum += scene.best_fit_ate;
-  }
-  return row + fmt::format(" {:.3f} |\n", sum / static_cast<double>(report.scenes.size()));
-}
-
-std::string wins_line(const SuiteReport& report) {
-  std::map<std::string, int> wins;
-  for (const SceneOutcome& scene : report.scenes) {
-    for (const MethodOutcome& outcome : scene.methods) {
-      if (outcome.failure.empty() && outcome.errors.ate_mean <= best_ate(scene)) {
-        ++wins[outcome.method];
-      }
+std::string summary_table(const SuiteReport& report) {
+  const bool floor = report.suite == "synthetic";
+  std::string out = fmt::format(
+      "\n### Over all {} scenes\n\n| Method | mean ATE | of coarse | worse than coarse | worst, of "
+      "coarse | first |{} mean seconds |\n|---|---|---|---|---|---|{}---|\n",
+      report.scenes.size(), floor ? " beats paper | beats robust |" : "", floor ? "---|---|" : "");
+  for (const RegistrationMethod& method : registration_methods()) {
+    for (const MethodSummary& s : summarise_methods(report.scenes)) {
+      if (s.method != method.name) continue;
+      const std::string ate = std::isnan(s.ate_mean) ? fmt::format("(no answer in {})", s.without)
+                                                     : fmt::format("{:.4f}", s.ate_mean);
+      out += fmt::format("| {} | {} | {:.3f} | {} | {:.3f} | {} |", method.title, ate,
+                         s.ate_to_coarse, s.worse_than_coarse, s.worst_to_coarse, s.first);
+      if (floor) out += fmt::format(" {} | {} |", s.beats_paper, s.beats_robust);
+      out += fmt::format(" {:.2f} |\n", s.seconds_mean);
     }
   }
-  std::string line = "\nFirst in ATE: ";
-  for (const RegistrationMethod& method : registration_methods()) {
-    if (wins.contains(method.name)) line += fmt::format("{} {}, ", method.title, wins[method.name]);
+  if (floor) {
+    double sum = 0;
+    for (const SceneOutcome& scene : report.scenes) sum += scene.best_fit_ate;
+    out += fmt::format("| *best Sim(3) for these passes* | {:.4f} | | | | | | | |\n",
+                       sum / static_cast<double>(report.scenes.size()));
   }
-  return line + fmt::format("of {} scenes (equal ones count for both).\n", report.scenes.size());
+  out += "\n'first': scenes with the smallest ATE of all, equal ones count for both.";
+  if (floor) {
+    out +=
+        " 'beats paper', 'beats robust': scenes where the method has the smaller ATE though that "
+        "is more than 10 % above what the best Sim(3) leaves.";
+  }
+  return out + "\n";
 }
 
-std::string paper_table(const SuiteReport& report) {
+std::string budget_name(int keyframes) {
+  return keyframes == 0 ? "all" : std::to_string(keyframes);
+}
+
+std::string ablation_section(const SuiteReport& report) {
+  std::map<int, std::vector<const AblationOutcome*>> by_keyframes;
+  for (const SceneOutcome& scene : report.scenes) {
+    for (const AblationOutcome& outcome : scene.ablation) {
+      by_keyframes[outcome.keyframes].push_back(&outcome);
+    }
+  }
+  if (by_keyframes.empty()) return "";
   std::string out =
-      "\n### The paper's printed numbers (theirs: their photos, network, hardware), ATE in "
-      "metres\n\n"
-      "| Method |";
+      "\n## Number of keyframes\n\nMean ATE over the scenes that have more frames than K; 'worse' "
+      "counts scenes where the fine stage raised the ATE.\n\n| K | scenes | coarse | full | change "
+      "| worse |\n|---|---|---|---|---|---|\n";
+  for (const int keyframes : kAblationKeyframes) {
+    const auto& outcomes = by_keyframes[keyframes];
+    if (outcomes.empty()) continue;
+    double coarse = 0, full = 0;
+    int worse = 0;
+    for (const AblationOutcome* outcome : outcomes) {
+      coarse += outcome->coarse_ate;
+      full += outcome->full_ate;
+      worse += outcome->full_ate > outcome->coarse_ate * (1 + 1e-9) ? 1 : 0;
+    }
+    const double count = static_cast<double>(outcomes.size());
+    out += fmt::format("| {} | {} | {:.4f} | {:.4f} | {:+.1f} % | {} |\n", budget_name(keyframes),
+                       outcomes.size(), coarse / count, full / count, 100 * (full / coarse - 1),
+                       worse);
+  }
+  const MonotonicityCount count = count_violations(report.scenes);
+  return out + fmt::format(
+                   "\nThe paper claims that the fine stage never makes ATE worse than coarse. Here "
+                   "it did in {} of {} cases; in the worst one by a factor of {:.3f}. (The stage "
+                   "checks its own residual, which is another thing: docs/numerics.md.)\n",
+                   count.violations, count.cases, count.worst_ratio);
+}
+
+std::string paper_tables(const SuiteReport& report) {
+  std::string head = "| Method |", rule = "|---|";
   std::vector<std::string> scenes;
   for (const SceneOutcome& scene : report.scenes) {
     if (paper_row(scene.scene, "paper")) scenes.push_back(scene.scene);
@@ -114,10 +163,14 @@ std::string paper_table(const SuiteReport& report) {
   if (scenes.empty()) {
     for (const std::string_view name : wat_scene_names()) scenes.emplace_back(name);
   }
-  for (const std::string& scene : scenes) out += " " + scene + " |";
-  out += "\n|---|";
-  for (size_t k = 0; k < scenes.size(); ++k) out += "---|";
-  out += "\n";
+  for (const std::string& scene : scenes) {
+    head += " " + scene + " |";
+    rule += "---|";
+  }
+  std::string out =
+      "\n## The paper's printed numbers (theirs: their photos, network, hardware)\n\n### ATE, "
+      "metres\n\n" +
+      head + "\n" + rule + "\n";
   for (const RegistrationMethod& method : registration_methods()) {
     std::string row = "| " + method.title + " (paper's) |";
     bool any = false;
@@ -128,102 +181,41 @@ std::string paper_table(const SuiteReport& report) {
     }
     if (any) out += row + "\n";
   }
-  return out;
-}
-
-std::string ablation_table(const SuiteReport& report) {
-  std::map<int, std::vector<const AblationOutcome*>> by_keyframes;
-  for (const SceneOutcome& scene : report.scenes) {
-    for (const AblationOutcome& outcome : scene.ablation) {
-      by_keyframes[outcome.keyframes == 0 ? 1 << 20 : outcome.keyframes].push_back(&outcome);
-    }
-  }
-  if (by_keyframes.empty()) return "";
-  std::string out =
-      "\n## Number of keyframes\n\nMean ATE over the scenes that have more frames than K; 'worse' "
-      "counts scenes where the fine stage raised the ATE.\n\n| K | scenes | coarse | full | change "
-      "| "
-      "worse |\n|---|---|---|---|---|---|\n";
-  for (const auto& [keyframes, outcomes] : by_keyframes) {
-    double coarse = 0, full = 0;
-    int worse = 0;
-    for (const AblationOutcome* outcome : outcomes) {
-      coarse += outcome->coarse_ate;
-      full += outcome->full_ate;
-      worse += outcome->full_ate > outcome->coarse_ate * (1 + 1e-9) ? 1 : 0;
-    }
-    const double count = static_cast<double>(outcomes.size());
-    out += fmt::format("| {} | {} | {:.4f} | {:.4f} | {:+.1f} % | {} |\n",
-                       keyframes == 1 << 20 ? "all" : std::to_string(keyframes), outcomes.size(),
-                       coarse / count, full / count, 100 * (full / coarse - 1), worse);
-  }
-  const MonotonicityCount count = count_violations(report.scenes);
-  out += fmt::format(
-      "\nThe paper claims that the fine stage never makes ATE worse than coarse. Here it did in {} "
-      "of "
-      "{} cases; in the worst one by a factor of {:.3f}. (The stage checks its own residual, which "
-      "is another thing: docs/numerics.md.)\n",
-      count.violations, count.cases, count.worst_ratio);
-  return out;
-}
-
-std::string change_table(const SuiteReport& report) {
-  std::string out;
-  for (const bool every_pixel : {false, true}) {
-    for (const bool unseen : {false, true}) {
-      std::string rows;
-      ChangeScores sum;
-      double unseen_called = 0;
-      int count = 0;
-      for (const SceneOutcome& scene : report.scenes) {
-        for (const ChangeOutcome& c : scene.changes) {
-          if (c.every_pixel != every_pixel || c.unseen_counted != unseen) continue;
-          rows += fmt::format(
-              "| {} | {:.1f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.1f} |\n",
-              scene_title(scene), 100 * scene.changed_share, c.scores.precision, c.scores.recall,
-              c.scores.f1, c.scores.auprc, c.scores.best_f1, 100 * c.unseen_called_changed);
-          sum.precision += c.scores.precision;
-          sum.recall += c.scores.recall;
-          sum.f1 += c.scores.f1;
-          sum.auprc += c.scores.auprc;
-          sum.best_f1 += c.scores.best_f1;
-          unseen_called += c.unseen_called_changed;
-          ++count;
-        }
+  out +=
+      "\n### Number of keyframes, ATE in millimetres, coarse / full (paper's)\n\n| K | car | mac | "
+      "grill | living_room |\n|---|---|---|---|---|\n";
+  for (const int keyframes : kAblationKeyframes) {
+    out += "| " + budget_name(keyframes) + " |";
+    for (const char* scene : {"car", "mac", "grill", "living_room"}) {
+      for (const PaperFineRow& row : paper_fine_rows()) {
+        if (row.scene != scene || row.keyframes != keyframes) continue;
+        out += fmt::format(" {:.1f} / {:.1f} |", row.coarse_mm, row.full_mm);
       }
-      if (count == 0) continue;
-      out += fmt::format(
-          "\n### {}, {}\n\n| Scene | changed % | precision | recall | F1 | AUPRC | best F1 | "
-          "never-seen "
-          "called changed % |\n|---|---|---|---|---|---|---|---|\n{}",
-          unseen ? "Never-seen surface counted" : "Only surface that both epochs saw",
-          every_pixel ? "every pixel (without evidence: called unchanged)" : "pixels with evidence",
-          rows);
-      out += fmt::format("| **mean** | | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.3f} | {:.1f} |\n",
-                         sum.precision / count, sum.recall / count, sum.f1 / count,
-                         sum.auprc / count, sum.best_f1 / count, 100 * unseen_called / count);
+    }
+    out += "\n";
+  }
+  return out;
+}
+
+// Why there is no number, for methods and scenes that have none.
+std::string failures(const SuiteReport& report) {
+  std::string out;
+  for (const RegistrationMethod& method : registration_methods()) {
+    if (!method.run) {
+      out += fmt::format("\n{}: {}.\n", method.title, method.absent_because);
+      continue;
+    }
+    for (const SceneOutcome& scene : report.scenes) {
+      for (const MethodOutcome& outcome : scene.methods) {
+        if (outcome.method != method.name || outcome.failure.empty()) continue;
+        out += fmt::format("\n{}, {}: {}\n", scene_title(scene), method.title, outcome.failure);
+      }
     }
   }
-  return out.empty() ? out
-                     : "\n## Change\n\nNearest-neighbour distance (the paper's), alignment by the "
-                       "paper's method. 'best F1' is the threshold tuned on the answer.\n" +
-                           out;
+  return out;
 }
 
 }  // namespace
-
-MonotonicityCount count_violations(const std::vector<SceneOutcome>& scenes) {
-  MonotonicityCount count;
-  for (const SceneOutcome& scene : scenes) {
-    for (const AblationOutcome& outcome : scene.ablation) {
-      ++count.cases;
-      const double ratio = outcome.full_ate / outcome.coarse_ate;
-      if (ratio > 1 + 1e-9) ++count.violations;
-      count.worst_ratio = std::max(count.worst_ratio, ratio);
-    }
-  }
-  return count;
-}
 
 std::string report_markdown(const SuiteReport& report) {
   const bool synthetic = report.suite == "synthetic";
@@ -234,42 +226,24 @@ std::string report_markdown(const SuiteReport& report) {
                        report.options.frames == 0 ? "each scene's own number of"
                                                   : std::to_string(report.options.frames),
                        report.options.width, report.options.keyframes);
+    if (report.options.change == SceneChange::kNone) out += "; nothing changes";
   }
   out += ". What is measured and how: docs/benchmark.md. Bold: smallest ATE of the scene.\n";
   out += "\n## Registration\n";
+  out += summary_table(report);
   out += table(
-      report, synthetic ? "ATE, mean, metres" : "ATE, mean, units of the true poses",
-      [](const MethodOutcome& m, bool best) {
-        const std::string number = fmt::format("{:.3f}", m.errors.ate_mean);
-        return best ? "**" + number + "**" : number;
-      },
-      [](const MethodOutcome& m) { return m.errors.ate_mean; });
-  if (synthetic) out += floor_row(report);
-  out += wins_line(report);
-  out += table(
-      report, "RTE, mean",
-      [](const MethodOutcome& m, bool) { return fmt::format("{:.3f}", m.errors.rte_mean); },
-      [](const MethodOutcome& m) { return m.errors.rte_mean; });
-  out += table(
-      report, "RRE, mean, degrees",
-      [](const MethodOutcome& m, bool) { return fmt::format("{:.3f}", m.errors.rre_mean_deg); },
-      [](const MethodOutcome& m) { return m.errors.rre_mean_deg; });
-  out += table(
-      report, "Registration, seconds",
-      [](const MethodOutcome& m, bool) { return fmt::format("{:.2f}", m.seconds); },
-      [](const MethodOutcome& m) { return m.seconds; });
-  for (const RegistrationMethod& method : registration_methods()) {
-    if (!method.run) out += fmt::format("\n{}: {}.\n", method.title, method.absent_because);
-  }
-  for (const SceneOutcome& scene : report.scenes) {
-    for (const MethodOutcome& outcome : scene.methods) {
-      if (outcome.failure.empty() || outcome.failure == "not yet") continue;
-      out += fmt::format("\n{}, {}: {}\n", scene_title(scene), outcome.method, outcome.failure);
-    }
-  }
-  out += ablation_table(report);
-  out += change_table(report);
-  if (!synthetic) out += paper_table(report);
+      report, synthetic ? "ATE, mean, metres" : "ATE, mean, units of the true poses", 3,
+      [](const MethodOutcome& m) { return m.errors.ate_mean; }, true);
+  out += table(report, "RTE, mean", 3, [](const MethodOutcome& m) { return m.errors.rte_mean; });
+  out += table(report, "RRE, mean, degrees", 3,
+               [](const MethodOutcome& m) { return m.errors.rre_mean_deg; });
+  out +=
+      table(report, "Registration, seconds", 2, [](const MethodOutcome& m) { return m.seconds; });
+  out += failures(report);
+  out += ablation_section(report);
+  out += change_section(report.scenes);
+  out += instance_section(report.scenes);
+  if (!synthetic) out += paper_tables(report);
   return out;
 }
 
@@ -297,26 +271,8 @@ std::string ablation_csv(const SuiteReport& report) {
   std::string out = "scene,seed,keyframes,coarse_ate,full_ate,verdict\n";
   for (const SceneOutcome& scene : report.scenes) {
     for (const AblationOutcome& a : scene.ablation) {
-      out += fmt::format("{},{},{},{},{},{}\n", scene.scene, scene.seed,
-                         a.keyframes == 0 ? "all" : std::to_string(a.keyframes), a.coarse_ate,
-                         a.full_ate, a.verdict);
-    }
-  }
-  return out;
-}
-
-std::string change_csv(const SuiteReport& report) {
-  std::string out =
-      "scene,seed,method,unseen_counted,every_pixel,pixels,changed_pixels,precision,recall,f1,"
-      "auprc,"
-      "best_f1,unseen_called_changed\n";
-  for (const SceneOutcome& scene : report.scenes) {
-    for (const ChangeOutcome& c : scene.changes) {
-      const ChangeScores& s = c.scores;
-      out +=
-          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}\n", scene.scene, scene.seed, c.method,
-                      c.unseen_counted ? 1 : 0, c.every_pixel ? 1 : 0, s.pixels, s.changed_pixels,
-                      s.precision, s.recall, s.f1, s.auprc, s.best_f1, c.unseen_called_changed);
+      out += fmt::format("{},{},{},{},{},{}\n", scene.scene, scene.seed, budget_name(a.keyframes),
+                         a.coarse_ate, a.full_ate, a.verdict);
     }
   }
   return out;
@@ -332,15 +288,20 @@ void write_report(const std::filesystem::path& directory, const SuiteReport& rep
   write_text_file(directory / "benchmark.md", report_markdown(report));
   write_text_file(directory / "benchmark.csv", registration_csv(report));
   write_text_file(directory / "trajectories.svg", trajectories_svg(report));
-  const bool has_ablation = std::any_of(report.scenes.begin(), report.scenes.end(),
-                                        [](const auto& scene) { return !scene.ablation.empty(); });
-  if (has_ablation) {
+  const auto any = [&](auto member) {
+    return std::any_of(report.scenes.begin(), report.scenes.end(),
+                       [&](const SceneOutcome& scene) { return !(scene.*member).empty(); });
+  };
+  if (any(&SceneOutcome::ablation)) {
     write_text_file(directory / "ablation.csv", ablation_csv(report));
     write_text_file(directory / "ablation.svg", ablation_svg(report));
   }
-  const bool has_change = std::any_of(report.scenes.begin(), report.scenes.end(),
-                                      [](const auto& scene) { return !scene.changes.empty(); });
-  if (has_change) write_text_file(directory / "change.csv", change_csv(report));
+  if (any(&SceneOutcome::changes)) {
+    write_text_file(directory / "change.csv", change_csv(report.scenes));
+  }
+  if (any(&SceneOutcome::instances)) {
+    write_text_file(directory / "instances.csv", instance_csv(report.scenes));
+  }
 }
 
 }  // namespace vggtcd

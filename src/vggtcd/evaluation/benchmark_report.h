@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The benchmark's report: benchmark.md, benchmark.csv, ablation.csv, change.csv, benchmark.json and
-// plots (docs/formats.md).
+// The benchmark's report: benchmark.md, benchmark.csv, ablation.csv, change.csv, instances.csv,
+// benchmark.json and plots (docs/formats.md).
 #pragma once
 
 #include <filesystem>
@@ -20,7 +20,6 @@ struct SuiteReport {
 std::string report_markdown(const SuiteReport& report);
 std::string registration_csv(const SuiteReport& report);
 std::string ablation_csv(const SuiteReport& report);
-std::string change_csv(const SuiteReport& report);
 // Predicted (red) and true (green) cameras from above, a row per method, a column per scene.
 std::string trajectories_svg(const SuiteReport& report);
 // ATE over the number of keyframes, coarse and with the fine stage, mean of all scenes.
@@ -28,12 +27,5 @@ std::string ablation_svg(const SuiteReport& report);
 
 // Writes all of them. Throws Error{kOutput}.
 void write_report(const std::filesystem::path& directory, const SuiteReport& report);
-
-// Budgets where the fine stage made ATE worse than coarse (by more than rounding, 1e-9 of it).
-struct MonotonicityCount {
-  int violations = 0, cases = 0;
-  double worst_ratio = 1;  // full / coarse
-};
-MonotonicityCount count_violations(const std::vector<SceneOutcome>& scenes);
 
 }  // namespace vggtcd

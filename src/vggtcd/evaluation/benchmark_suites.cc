@@ -11,6 +11,7 @@
 #include "vggtcd/evaluation/benchmark_json.h"
 #include "vggtcd/evaluation/benchmark_report.h"
 #include "vggtcd/evaluation/registration_methods.h"
+#include "vggtcd/evaluation/synthetic/scene.h"
 #include "vggtcd/evaluation/wat.h"
 #include "vggtcd/io/json_file.h"
 
@@ -18,6 +19,10 @@ namespace vggtcd {
 namespace {
 
 namespace fs = std::filesystem;
+
+std::vector<std::string> names(std::span<const std::string_view> list) {
+  return {list.begin(), list.end()};
+}
 
 std::vector<std::string> chosen_scenes(const std::string& list,
                                        const std::vector<std::string>& available) {
@@ -41,7 +46,7 @@ std::vector<std::string> chosen_scenes(const std::string& list,
 // What a kept result must agree with to be used again.
 Json fingerprint(const BenchmarkOptions& options) {
   Json json = options_to_json(options);
-  for (const char* irrelevant : {"scenes", "seeds", "first_seed"}) json.erase(irrelevant);
+  for (const char* irrelevant : {"scenes", "seeds"}) json.erase(irrelevant);
   json["version"] = kVersion;
   Json methods = Json::array();
   for (const RegistrationMethod& method : registration_methods()) {
@@ -72,10 +77,12 @@ SceneOutcome resume_or_run(const fs::path& file, const Json& options,
 }
 
 void make_output(const fs::path& out) {
-  std::error_code error;
-  fs::create_directories(out / "scenes", error);
-  if (error) {
-    throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", out.string(), error.message());
+  for (const char* folder : {"scenes", "rivals"}) {
+    std::error_code error;
+    fs::create_directories(out / folder, error);
+    if (error) {
+      throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", out.string(), error.message());
+    }
   }
 }
 
@@ -84,26 +91,27 @@ void make_output(const fs::path& out) {
 std::vector<SceneOutcome> run_synthetic_suite(const fs::path& out, const BenchmarkOptions& options,
                                               ProgressSink& progress) {
   options.validate();
-  std::vector<std::string> available(scene_names().begin(), scene_names().end());
   SuiteReport report{"synthetic", options, {}};
-  const std::vector<std::string> scenes = chosen_scenes(options.scenes, available);
+  const std::vector<std::string> scenes =
+      options.scenes == "all" ? names(scene_names())
+                              : chosen_scenes(options.scenes, names(all_scene_names()));
   make_output(out);
   for (const std::string& scene : scenes) {
-    for (int k = 0; k < options.seeds; ++k) {
-      const uint64_t seed = options.first_seed + static_cast<uint64_t>(k);
+    for (const uint64_t seed : parse_seeds(options.seeds)) {
       const fs::path file = out / "scenes" / fmt::format("{}_{}.json", scene, seed);
       progress.notice(fmt::format("{} #{}", scene, seed));
       report.scenes.push_back(resume_or_run(
           file, fingerprint(options),
-          [&] { return run_synthetic_scene(scene, seed, options, progress); }, progress));
+          [&] { return run_synthetic_scene(scene, seed, options, out / "rivals", progress); },
+          progress));
+      write_report(out, report);
     }
   }
-  write_report(out, report);
   return std::move(report.scenes);
 }
 
 std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& data,
-                                        const fs::path& predictions,
+                                        const WatPredictions& predictions,
                                         const BenchmarkOptions& options, ProgressSink& progress) {
   options.validate();
   SuiteReport report{"wat", options, {}};
@@ -111,14 +119,20 @@ std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& dat
   make_output(out);
   Json key = fingerprint(options);
   key["data"] = fs::absolute(data).lexically_normal().string();
-  key["predictions"] = fs::absolute(predictions).lexically_normal().string();
+  key["predictions"] = fs::absolute(predictions.directory).lexically_normal().string();
+  key["made_by"] = predictions.made_by;
   for (const std::string& scene : scenes) {
     progress.notice(scene);
     report.scenes.push_back(resume_or_run(
         out / "scenes" / (scene + ".json"), key,
-        [&] { return run_wat_scene(scene, data, predictions, options, progress); }, progress));
+        [&] {
+          if (predictions.predict) predictions.predict(scene);
+          return run_wat_scene(scene, data, predictions.directory, options, out / "rivals",
+                               progress);
+        },
+        progress));
+    write_report(out, report);
   }
-  write_report(out, report);
   return std::move(report.scenes);
 }
 

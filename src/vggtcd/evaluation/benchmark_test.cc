@@ -7,6 +7,8 @@
 #include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/benchmark_report.h"
+#include "vggtcd/evaluation/benchmark_summary.h"
+#include "vggtcd/evaluation/change_tables.h"
 #include "vggtcd/evaluation/paper_numbers.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
 #include "vggtcd/evaluation/wat.h"
@@ -19,7 +21,7 @@ namespace fs = std::filesystem;
 BenchmarkOptions slice() {
   BenchmarkOptions options;
   options.scenes = "living_room,barbecue";
-  options.first_seed = 11;
+  options.seeds = "11";
   options.frames = 10;
   options.width = 96;
   options.rivals = false;
@@ -27,20 +29,10 @@ BenchmarkOptions slice() {
 }
 
 const MethodOutcome& method(const SceneOutcome& scene, const std::string& name) {
-  for (const MethodOutcome& outcome : scene.methods) {
-    if (outcome.method == name) return outcome;
-  }
-  throw std::runtime_error("no method " + name);
+  const MethodOutcome* found = find_outcome(scene, name);
+  if (found == nullptr) throw std::runtime_error("no outcome of " + name);
+  return *found;
 }
-
-class Recorder : public ProgressSink {
- public:
-  void stage_started(std::string_view) override {}
-  void stage_advanced(std::string_view, double) override {}
-  void stage_finished(std::string_view, double) override {}
-  void notice(std::string_view message) override { notices.emplace_back(message); }
-  std::vector<std::string> notices;
-};
 
 class Slice : public testing::Test {
  protected:
@@ -59,47 +51,66 @@ class Slice : public testing::Test {
   static inline std::vector<SceneOutcome> scenes_;
 };
 
-TEST_F(Slice, ThePapersMethodRegistersAndTheIdentityDoesNot) {
+// What the slice gave when the limits were set, with the margin that each test states.
+struct Measured {
+  const char* scene;
+  double ate_m, best_fit_ate_m, distance_f1, votes_f1;
+};
+constexpr Measured kMeasured[] = {{"living_room", 0.0360, 0.0256, 0.763, 0.683},
+                                  {"barbecue", 0.0783, 0.0787, 0.409, 0.602}};
+
+TEST_F(Slice, ThePapersMethodRegistersWithinFixedLimits) {
   ASSERT_EQ(scenes_.size(), 2u);
-  for (const SceneOutcome& scene : scenes_) {
+  for (size_t k = 0; k < 2; ++k) {
+    const SceneOutcome& scene = scenes_[k];
+    ASSERT_EQ(scene.scene, kMeasured[k].scene);
     const double paper = method(scene, "paper").errors.ate_mean;
-    // The best Sim(3) leaves what the passes got wrong by themselves, about 1 % of the extent. The
-    // paper's method may add as much again (its own tables: full-sequence joint inference improves
-    // K = 5 by 8 %, K = 2 is twice as bad): twice the floor. A broken step is at tenfold.
-    EXPECT_LT(paper, 2 * scene.best_fit_ate) << scene.scene;
-    EXPECT_LT(scene.best_fit_ate, 0.02 * scene.extent) << scene.scene;
+    // A quarter more: other keyframes or another static set move ATE by a few percent; a stage that
+    // does not run, or a wrong frame, doubles it at least.
+    EXPECT_LT(paper, 1.25 * kMeasured[k].ate_m) << scene.scene;
+    EXPECT_LT(method(scene, "coarse").errors.ate_mean, 1.25 * kMeasured[k].ate_m) << scene.scene;
+    // The floor depends on the generator alone.
+    EXPECT_NEAR(scene.best_fit_ate, kMeasured[k].best_fit_ate_m, 0.05 * scene.best_fit_ate)
+        << scene.scene;
     // The passes differ in scale by 1.3 and 1.6 and start elsewhere.
     EXPECT_GT(method(scene, "vggt_only").errors.ate_mean, 5 * paper) << scene.scene;
-    EXPECT_LT(method(scene, "coarse").errors.ate_mean, 2 * scene.best_fit_ate) << scene.scene;
+    EXPECT_NE(find_outcome(scene, "robust"), nullptr) << scene.scene;
   }
 }
 
-TEST_F(Slice, ChangesAreFoundWhereBothEpochsLooked) {
-  for (const SceneOutcome& scene : scenes_) {
-    ASSERT_EQ(scene.changes.size(), 4u);
-    double f1[2][2] = {}, base_rate = 0;
-    for (const ChangeOutcome& c : scene.changes) {
-      f1[c.every_pixel][c.unseen_counted] = c.scores.f1;
-      if (!c.every_pixel && !c.unseen_counted) {
-        base_rate =
-            static_cast<double>(c.scores.changed_pixels) / static_cast<double>(c.scores.pixels);
-        // Calling everything changed has this precision; ranking must do far better.
-        EXPECT_GT(c.scores.auprc, 3 * base_rate) << scene.scene;
-        // Independent experiments with a plain distance at its best threshold find F1 of 0.46 over
-        // all surface; on surface that both epochs saw it must not be worse.
-        EXPECT_GT(c.scores.best_f1, 0.46) << scene.scene;
-      }
-      EXPECT_GT(c.unseen_called_changed, 0.1);  // the known weakness of a plain distance
+const ChangeOutcome& change(const SceneOutcome& scene, const std::string& name, bool unseen,
+                            bool every_pixel) {
+  for (const ChangeOutcome& outcome : scene.changes) {
+    if (outcome.method == name && outcome.alignment == "paper" &&
+        outcome.unseen_counted == unseen && outcome.every_pixel == every_pixel) {
+      return outcome;
     }
-    // Calling everything changed has F1 = 2 p / (1 + p).
-    EXPECT_GT(f1[0][0], 1.5 * 2 * base_rate / (1 + base_rate)) << scene.scene;
-    EXPECT_GT(f1[0][0], f1[0][1]) << "never-seen surface is hard";
-    EXPECT_GT(f1[0][0], f1[1][0]) << "pixels without evidence are missed changes";
+  }
+  throw std::runtime_error("no outcome " + name);
+}
+
+TEST_F(Slice, ChangesAreFoundWithinFixedLimits) {
+  for (size_t k = 0; k < 2; ++k) {
+    const SceneOutcome& scene = scenes_[k];
+    // 2 methods, 2 alignments, 4 ways to count.
+    ASSERT_EQ(scene.changes.size(), 16u);
+    const ChangeOutcome& distance = change(scene, "distance", false, false);
+    const ChangeOutcome& votes = change(scene, "votes", false, false);
+    // A tenth less than measured.
+    EXPECT_GT(distance.scores.f1, 0.9 * kMeasured[k].distance_f1) << scene.scene;
+    EXPECT_GT(votes.scores.f1, 0.9 * kMeasured[k].votes_f1) << scene.scene;
+    // The known weakness of a plain distance, and what votes are for.
+    EXPECT_GT(distance.unseen_called_changed, 0.5) << scene.scene;
+    EXPECT_LT(votes.unseen_called_changed, 0.01) << scene.scene;
+    EXPECT_GT(distance.scores.f1, change(scene, "distance", true, false).scores.f1)
+        << "never-seen surface is hard";
+    EXPECT_GT(distance.scores.f1, change(scene, "distance", false, true).scores.f1)
+        << "pixels without evidence are missed changes";
   }
 }
 
 TEST_F(Slice, FinishedScenesAreNotComputedAgain) {
-  Recorder recorder;
+  RecordingProgress recorder;
   const auto stamp = fs::last_write_time(directory_ / "scenes" / "barbecue_11.json");
   const auto again = run_synthetic_suite(directory_, slice(), recorder);
   EXPECT_EQ(fs::last_write_time(directory_ / "scenes" / "barbecue_11.json"), stamp);
@@ -111,7 +122,8 @@ TEST_F(Slice, FinishedScenesAreNotComputedAgain) {
   const SuiteReport first{"synthetic", slice(), scenes_}, second{"synthetic", slice(), again};
   EXPECT_EQ(registration_csv(second), registration_csv(first));
   EXPECT_EQ(ablation_csv(second), ablation_csv(first));
-  EXPECT_EQ(change_csv(second), change_csv(first));
+  EXPECT_EQ(change_csv(again), change_csv(scenes_));
+  EXPECT_EQ(instance_csv(again), instance_csv(scenes_));
   EXPECT_EQ(trajectories_svg(second), trajectories_svg(first));
 }
 
@@ -134,19 +146,11 @@ TEST_F(Slice, ReportHasEveryTableAndPlot) {
     EXPECT_GT(fs::file_size(directory_ / name), 100u) << name;
   }
   const std::string text = report_markdown({"synthetic", slice(), scenes_});
-  for (const char* part : {"ATE", "RTE", "RRE", "seconds", "GeoTransformer: not yet", "AUPRC",
-                           "living_room #11", "never makes ATE worse"}) {
+  for (const char* part :
+       {"ATE", "RTE", "RRE", "seconds", "GeoTransformer: not yet", "AUPRC", "living_room #11",
+        "never makes ATE worse", "Over all 2 scenes", "votes, alignment robust"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part;
   }
-}
-
-TEST(CountViolations, CountsOnlyRealOnes) {
-  SceneOutcome scene;
-  scene.ablation = {{2, 1.0, 0.9, ""}, {3, 1.0, 1.0, ""}, {5, 1.0, 1.2, ""}, {0, 2.0, 2.1, ""}};
-  const MonotonicityCount count = count_violations({scene});
-  EXPECT_EQ(count.violations, 2);
-  EXPECT_EQ(count.cases, 4);
-  EXPECT_DOUBLE_EQ(count.worst_ratio, 1.2);
 }
 
 TEST(WatSuite, ReproducesTheSyntheticNumbersFromFiles) {
@@ -163,14 +167,14 @@ TEST(WatSuite, ReproducesTheSyntheticNumbersFromFiles) {
   BenchmarkOptions benchmark;
   benchmark.rivals = false;
   benchmark.ablation = false;
-  benchmark.first_seed = 5;
   benchmark.frames = 8;
   benchmark.width = 64;
   const auto from_files =
       run_wat_suite(base / "out", base / "predictions" / "coffee_corner" / "wat",
-                    base / "predictions", benchmark, silent_progress());
+                    {base / "predictions", "", {}}, benchmark, silent_progress());
   ASSERT_EQ(from_files.size(), 1u);
-  const SceneOutcome direct = run_synthetic_scene("coffee_corner", 5, benchmark, silent_progress());
+  const SceneOutcome direct =
+      run_synthetic_scene("coffee_corner", 5, benchmark, {}, silent_progress());
   for (const char* name : {"vggt_only", "coarse", "paper"}) {
     // COLMAP keeps poses in double as quaternions; predictions are f32 in both.
     EXPECT_NEAR(method(from_files[0], name).errors.ate_mean, method(direct, name).errors.ate_mean,
@@ -179,7 +183,7 @@ TEST(WatSuite, ReproducesTheSyntheticNumbersFromFiles) {
   }
   // Resumed from what is kept.
   EXPECT_EQ(run_wat_suite(base / "out", base / "predictions" / "coffee_corner" / "wat",
-                          base / "predictions", benchmark, silent_progress())
+                          {base / "predictions", "", {}}, benchmark, silent_progress())
                 .size(),
             1u);
 }

@@ -19,14 +19,19 @@ double f1_of(double precision, double recall) {
   return precision + recall > 0 ? 2 * precision * recall / (precision + recall) : 0.0;
 }
 
-}  // namespace
+void evaluate_decisions(const ScoredPixels& pixels, ChangeScores& result) {
+  int64_t called = 0, right = 0;
+  for (size_t k = 0; k < pixels.called.size(); ++k) {
+    called += pixels.called[k];
+    right += pixels.called[k] & pixels.changed[k];
+  }
+  result.precision = ratio(right, called);
+  result.recall = ratio(right, result.changed_pixels);
+  result.f1 = f1_of(result.precision, result.recall);
+  result.false_alarms = ratio(called - right, result.pixels - result.changed_pixels);
+}
 
-ChangeScores evaluate_changes(const ScoredPixels& pixels, float threshold) {
-  check(pixels.scores.size() == pixels.changed.size(), "evaluate_changes: one label per score");
-  ChangeScores result;
-  result.pixels = static_cast<int64_t>(pixels.scores.size());
-  result.changed_pixels = std::accumulate(pixels.changed.begin(), pixels.changed.end(), int64_t{0});
-
+void evaluate_ranking(const ScoredPixels& pixels, ChangeScores& result) {
   std::vector<uint32_t> order(pixels.scores.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -34,16 +39,8 @@ ChangeScores evaluate_changes(const ScoredPixels& pixels, float threshold) {
   });
   int64_t called = 0, right = 0;
   double recall_before = 0;
-  bool passed_threshold = false;
-  const auto at_threshold = [&] {
-    result.precision = ratio(right, called);
-    result.recall = ratio(right, result.changed_pixels);
-    result.f1 = f1_of(result.precision, result.recall);
-    passed_threshold = true;
-  };
   for (size_t k = 0; k < order.size(); ++k) {
     const float score = pixels.scores[order[k]];
-    if (!passed_threshold && !(score > threshold)) at_threshold();
     ++called;
     right += pixels.changed[order[k]];
     const bool last = k + 1 == order.size();
@@ -57,7 +54,19 @@ ChangeScores evaluate_changes(const ScoredPixels& pixels, float threshold) {
           last ? -std::numeric_limits<float>::infinity() : pixels.scores[order[k + 1]];
     }
   }
-  if (!passed_threshold) at_threshold();
+}
+
+}  // namespace
+
+ChangeScores evaluate_changes(const ScoredPixels& pixels) {
+  check(
+      pixels.scores.size() == pixels.changed.size() && pixels.scores.size() == pixels.called.size(),
+      "evaluate_changes: a score, a call and a label per pixel");
+  ChangeScores result;
+  result.pixels = static_cast<int64_t>(pixels.scores.size());
+  result.changed_pixels = std::accumulate(pixels.changed.begin(), pixels.changed.end(), int64_t{0});
+  evaluate_decisions(pixels, result);
+  evaluate_ranking(pixels, result);
   return result;
 }
 

@@ -12,19 +12,21 @@
 namespace vggtcd {
 namespace {
 
-ScoredPixels pixels(const std::vector<std::pair<float, int>>& list) {
+// Called changed: score > threshold.
+ScoredPixels pixels(const std::vector<std::pair<float, int>>& list, float threshold) {
   ScoredPixels result;
-  for (const auto& [score, changed] : list) result.add(score, changed != 0);
+  for (const auto& [score, changed] : list) result.add(score, score > threshold, changed != 0);
   return result;
 }
 
 TEST(EvaluateChanges, CountsByHand) {
   // Above 0.5: 3 pixels, 2 of them changed; 3 changed in all.
   const ChangeScores s =
-      evaluate_changes(pixels({{0.9f, 1}, {0.8f, 0}, {0.7f, 1}, {0.5f, 1}, {0.1f, 0}}), 0.5f);
+      evaluate_changes(pixels({{0.9f, 1}, {0.8f, 0}, {0.7f, 1}, {0.5f, 1}, {0.1f, 0}}, 0.5f));
   EXPECT_DOUBLE_EQ(s.precision, 2.0 / 3);
   EXPECT_DOUBLE_EQ(s.recall, 2.0 / 3);
   EXPECT_DOUBLE_EQ(s.f1, 2.0 / 3);
+  EXPECT_DOUBLE_EQ(s.false_alarms, 1.0 / 2);
   // Steps in recall at 0.9 (1/1), 0.7 (2/3), 0.5 (3/4), a third each.
   EXPECT_DOUBLE_EQ(s.auprc, (1.0 + 2.0 / 3 + 3.0 / 4) / 3);
   // Best: all down to 0.5, precision 3/4, recall 1; the threshold is the next score below.
@@ -34,11 +36,12 @@ TEST(EvaluateChanges, CountsByHand) {
 
 TEST(EvaluateChanges, AgreesWithBruteForceOverThresholdsWithTies) {
   Random random(9);
-  ScoredPixels list;
+  std::vector<std::pair<float, int>> drawn;
   for (int k = 0; k < 400; ++k) {
     const float score = static_cast<float>(random.below(25));
-    list.add(score, random.uniform() < 0.1 + 0.03 * static_cast<double>(score));
+    drawn.emplace_back(score, random.uniform() < 0.1 + 0.03 * static_cast<double>(score));
   }
+  const ScoredPixels list = pixels(drawn, 0);
   const auto at = [&](float threshold) {
     double called = 0, right = 0, changed = 0;
     for (size_t k = 0; k < list.scores.size(); ++k) {
@@ -60,7 +63,7 @@ TEST(EvaluateChanges, AgreesWithBruteForceOverThresholdsWithTies) {
     best = std::max(best, f1);
   }
   for (const float threshold : {-1.0f, 0.0f, 7.0f, 7.5f, 23.0f, 24.0f, 99.0f}) {
-    const ChangeScores s = evaluate_changes(list, threshold);
+    const ChangeScores s = evaluate_changes(pixels(drawn, threshold));
     const auto [precision, recall, f1] = at(threshold);
     EXPECT_DOUBLE_EQ(s.precision, precision) << threshold;
     EXPECT_DOUBLE_EQ(s.recall, recall) << threshold;
@@ -72,13 +75,25 @@ TEST(EvaluateChanges, AgreesWithBruteForceOverThresholdsWithTies) {
 }
 
 TEST(EvaluateChanges, IsZeroWhereNothingIsThere) {
-  const ChangeScores none = evaluate_changes({}, 0.5f);
+  const ChangeScores none = evaluate_changes({});
   EXPECT_EQ(none.f1, 0);
   EXPECT_EQ(none.auprc, 0);
-  const ChangeScores nothing_changed = evaluate_changes(pixels({{0.9f, 0}, {0.1f, 0}}), 0.5f);
+  const ChangeScores nothing_changed = evaluate_changes(pixels({{0.9f, 0}, {0.1f, 0}}, 0.5f));
   EXPECT_EQ(nothing_changed.precision, 0);
   EXPECT_EQ(nothing_changed.recall, 0);
   EXPECT_EQ(nothing_changed.auprc, 0);
+  EXPECT_EQ(nothing_changed.false_alarms, 0.5);
+}
+
+TEST(EvaluateChanges, TakesDecisionsThatAreNotAThresholdOnTheScore) {
+  ScoredPixels list;
+  list.add(0.1f, true, true);
+  list.add(0.9f, false, true);
+  list.add(0.5f, false, false);
+  const ChangeScores s = evaluate_changes(list);
+  EXPECT_DOUBLE_EQ(s.precision, 1);
+  EXPECT_DOUBLE_EQ(s.recall, 0.5);
+  EXPECT_DOUBLE_EQ(s.auprc, (1.0 + 2.0 / 3) / 2);
 }
 
 }  // namespace

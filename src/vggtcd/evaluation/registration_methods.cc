@@ -3,6 +3,7 @@
 #include "vggtcd/evaluation/registration_methods.h"
 
 #include "vggtcd/evaluation/baselines/rivals.h"
+#include "vggtcd/registration/candidates.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 
@@ -15,6 +16,13 @@ Sim3 align_coarse_only(const RegistrationProblem& problem) {
 
 Sim3 align_as_paper(const RegistrationProblem& problem) {
   return align_fine(problem.before, problem.after, align_coarse_only(problem), {}).t2_from_t1;
+}
+
+Sim3 align_robustly(const RegistrationProblem& problem) {
+  const Sim3 coarse = align_coarse_only(problem);
+  const FineResult fine = align_fine(problem.before, problem.after, coarse, {});
+  return choose_alignment(problem.before, problem.after, {"coarse", coarse, 0}, fine, {})
+      .t2_from_t1;
 }
 
 RegistrationMethod rival(const std::string& name, std::string title) {
@@ -39,6 +47,7 @@ std::vector<RegistrationMethod> registration_methods() {
   methods.push_back({"geotransformer", "GeoTransformer", true, {}, "not yet"});
   methods.push_back({"coarse", "coarse only", false, align_coarse_only, ""});
   methods.push_back({"paper", "VGGT-CD (paper)", false, align_as_paper, ""});
+  methods.push_back({"robust", "VGGT-CD robust", false, align_robustly, ""});
   return methods;
 }
 

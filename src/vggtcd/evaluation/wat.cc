@@ -2,6 +2,8 @@
 // Reading the WAT layout.
 #include "vggtcd/evaluation/wat.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 
@@ -50,6 +52,14 @@ std::vector<Rigid3> poses_of_sequence(const std::map<std::string, Rigid3>& regis
     poses.push_back(found->second);
   }
   return poses;
+}
+
+std::map<std::string, Rigid3> registered_poses(const fs::path& scene_directory) {
+  std::map<std::string, Rigid3> registered;
+  for (const NamedPose& pose : colmap_trajectory(read_colmap(scene_directory / "sparse" / "0"))) {
+    registered[pose.name] = pose.camera_from_world;
+  }
+  return registered;
 }
 
 }  // namespace
@@ -104,13 +114,34 @@ std::vector<std::string> list_wat_scenes(const fs::path& data) {
   return found;
 }
 
+WatPhotos list_wat_photos(const fs::path& scene_directory) {
+  const std::vector<WatSequence> sequences = list_wat_sequences(scene_directory);
+  const std::map<std::string, Rigid3> registered = registered_poses(scene_directory);
+  const auto photos_of = [&](const WatSequence& sequence) {
+    std::vector<fs::path> photos;
+    for (const std::string& name : sequence.photos) {
+      if (registered.contains(sequence.name + "/" + name)) {
+        photos.push_back(scene_directory / "images" / sequence.name / name);
+      }
+    }
+    if (photos.size() < 2) {
+      throw_error(ErrorCode::kInput,
+                  "{}: expected at least 2 photos of sequence '{}' with a COLMAP pose, found {}",
+                  scene_directory.string(), sequence.name, photos.size());
+    }
+    return photos;
+  };
+  return {photos_of(sequences[0]), photos_of(sequences[1])};
+}
+
+std::string wat_joint_name(int keyframes) {
+  return keyframes == 0 ? "joint_all.npz" : fmt::format("joint_{}.npz", keyframes);
+}
+
 BitemporalTrajectory read_wat_truth(const fs::path& scene_directory, const Reconstruction& before,
                                     const Reconstruction& after) {
   const std::vector<WatSequence> sequences = list_wat_sequences(scene_directory);
-  std::map<std::string, Rigid3> registered;
-  for (const NamedPose& pose : colmap_trajectory(read_colmap(scene_directory / "sparse" / "0"))) {
-    registered[pose.name] = pose.camera_from_world;
-  }
+  const std::map<std::string, Rigid3> registered = registered_poses(scene_directory);
   return {poses_of_sequence(registered, sequences[0], before, scene_directory),
           poses_of_sequence(registered, sequences[1], after, scene_directory)};
 }

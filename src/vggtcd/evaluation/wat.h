@@ -25,6 +25,16 @@ std::vector<WatSequence> list_wat_sequences(const std::filesystem::path& scene_d
 // name. Throws Error{kInput} if there is none.
 std::vector<std::string> list_wat_scenes(const std::filesystem::path& data);
 
+// The photos of the two sequences that COLMAP registered: what is to be predicted.
+struct WatPhotos {
+  std::vector<std::filesystem::path> before, after;
+};
+WatPhotos list_wat_photos(const std::filesystem::path& scene_directory);
+
+// The prediction file of a joint pass over K keyframes per epoch, for the ablation: joint_5.npz,
+// and joint_all.npz for 0.
+std::string wat_joint_name(int keyframes);
+
 // The true poses for the frames of both predictions. Frames are matched to COLMAP's images by name
 // (SEQUENCE/NAME); where the predictions carry no names, by order, if the numbers agree. Frames
 // that COLMAP did not register are an error that names the first one.

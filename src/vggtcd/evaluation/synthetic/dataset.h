@@ -15,6 +15,7 @@ namespace vggtcd {
 struct SynthesizeOptions {
   std::string scene = "kitchen";
   uint64_t seed = 1;
+  SceneChange change = SceneChange::kScene;
   int keyframes = 5;
   int jpeg_quality = 92;
   bool photos = true;
@@ -25,6 +26,8 @@ struct SynthesizeOptions {
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("scene", self.scene, "which scene; --list names them");
     field("seed", self.seed, "varies shapes, places, textures, walks, light and errors");
+    field("change", self.change,
+          "scene: what changes is the scene's own list; none: nothing changes but light and walk");
     field("keyframes", self.keyframes, "keyframes per epoch in the joint pass (the paper's K)");
     field("jpeg_quality", self.jpeg_quality, "1 to 100");
     field("photos", self.photos, "write before/ and after/");

@@ -193,6 +193,17 @@ Pinhole scaled_pinhole(const Pinhole& pinhole, int scale) {
           scale * pinhole.cy + shift, scale * pinhole.width, scale * pinhole.height};
 }
 
+double changed_share(const SceneTruth& truth) {
+  int64_t changed = 0, surface = 0;
+  for (const EpochTruth& epoch : truth.epoch) {
+    for (size_t pixel = 0; pixel < epoch.label.size(); ++pixel) {
+      surface += epoch.object[pixel] != 0 ? 1 : 0;
+      changed += epoch.label[pixel] == kLabelChanged ? 1 : 0;
+    }
+  }
+  return static_cast<double>(changed) / static_cast<double>(std::max<int64_t>(1, surface));
+}
+
 SceneTruth render(const SyntheticScene& scene, const RenderOptions& options, ProgressSink& progress,
                   const PhotoSink& photo_sink) {
   options.validate();

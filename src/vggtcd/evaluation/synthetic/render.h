@@ -60,6 +60,9 @@ struct SceneTruth {
   const EpochTruth& of(Epoch which) const { return epoch[static_cast<int>(which)]; }
 };
 
+// Share of the pixels that show a surface, both epochs together, that are labelled changed.
+double changed_share(const SceneTruth& truth);
+
 // Called for each photo in order: T1's frames, then T2's.
 using PhotoSink = std::function<void(Epoch, int frame, const Image& photo)>;
 

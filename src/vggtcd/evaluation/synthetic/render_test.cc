@@ -239,6 +239,27 @@ INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          testing::ValuesIn(scene_names().begin(), scene_names().end()),
                          [](const auto& each) { return std::string(each.param); });
 
+TEST(MakeScene, NothingChangesWhereNothingShall) {
+  const SyntheticScene scene = make_scene("living_room", 1, SceneChange::kNone);
+  const SceneTruth truth = render(scene, small(6, 64), silent_progress());
+  EXPECT_EQ(changed_share(truth), 0);
+  // The same place as the scene with changes: its T1 is the same.
+  const SceneTruth changing = render(make_scene("living_room", 1), small(6, 64), silent_progress());
+  EXPECT_EQ(truth.of(Epoch::kT1).depth_m, changing.of(Epoch::kT1).depth_m);
+  EXPECT_NE(truth.of(Epoch::kT2).depth_m, changing.of(Epoch::kT2).depth_m);
+}
+
+TEST(MakeScene, MovingDayChangesFortyPercentAndIsNotOneOfTheEleven) {
+  EXPECT_EQ(scene_names().size(), 11u);
+  EXPECT_EQ(all_scene_names().back(), "moving_day");
+  for (const uint64_t seed : {1, 2, 3}) {
+    const SceneTruth truth =
+        render(make_scene("moving_day", seed), small(12, 64), silent_progress());
+    EXPECT_GE(changed_share(truth), 0.36) << seed;
+    EXPECT_LE(changed_share(truth), 0.46) << seed;
+  }
+}
+
 TEST(MakeScene, RefusesAnUnknownNameAndListsTheKnownOnes) {
   try {
     make_scene("moon", 1);

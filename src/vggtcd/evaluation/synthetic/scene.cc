@@ -35,7 +35,14 @@ constexpr NamedScene kScenes[] = {
     {"living_room", false, build_living_room},
     {"desk", false, build_desk},
     {"worktop", false, build_worktop},
+    {"moving_day", false, build_moving_day},  // beside the eleven
 };
+constexpr size_t kNumScenes = 11;
+
+void take_changes_back(std::vector<SceneObject>& objects) {
+  std::erase_if(objects, [](const SceneObject& object) { return !object.world_from_object[0]; });
+  for (SceneObject& object : objects) object.world_from_object[1] = object.world_from_object[0];
+}
 
 // Catmull-Rom through the knots, 0 <= t <= 1.
 Vector3d spline(const std::vector<Vector3d>& knots, double t) {
@@ -80,7 +87,19 @@ ObjectChange SceneObject::change() const {
   return same ? ObjectChange::kUnchanged : ObjectChange::kMoved;
 }
 
-std::span<const std::string_view> scene_names() {
+std::span<const EnumName<SceneChange>> enum_names(SceneChange) {
+  static constexpr EnumName<SceneChange> kNames[] = {{SceneChange::kScene, "scene"},
+                                                     {SceneChange::kNone, "none"}};
+  return kNames;
+}
+
+Eigen::AlignedBox3d SceneObject::box_m() const {
+  Eigen::AlignedBox3d box;
+  for (const Mesh::Vertex& vertex : mesh.vertices) box.extend(vertex.position_m.cast<double>());
+  return box;
+}
+
+std::span<const std::string_view> all_scene_names() {
   static const std::vector<std::string_view> names = [] {
     std::vector<std::string_view> list;
     for (const NamedScene& scene : kScenes) list.push_back(scene.name);
@@ -89,19 +108,24 @@ std::span<const std::string_view> scene_names() {
   return names;
 }
 
-SyntheticScene make_scene(std::string_view name, uint64_t seed) {
+std::span<const std::string_view> scene_names() { return all_scene_names().first(kNumScenes); }
+
+SyntheticScene make_scene(std::string_view name, uint64_t seed, SceneChange change) {
   for (const NamedScene& entry : kScenes) {
     if (entry.name != name) continue;
     SceneBuilder builder(name, seed);
     builder.scene.outdoor = entry.outdoor;
     entry.build(builder);
+    if (change == SceneChange::kNone) take_changes_back(builder.scene.objects);
     return std::move(builder.scene);
   }
   std::string known;
-  for (const std::string_view each : scene_names())
+  for (const std::string_view each : all_scene_names())
     known += (known.empty() ? "" : ", ") + std::string(each);
   throw_error(ErrorCode::kUsage, "scene: expected one of {}, found '{}'", known, name);
 }
+
+namespace {
 
 CameraPath arc_path(Random& random, const WalkPlan& plan) {
   constexpr int kKnots = 7;
@@ -121,10 +145,9 @@ CameraPath arc_path(Random& random, const WalkPlan& plan) {
   return path;
 }
 
-CameraPath line_path(Random& random, const Vector3d& from_m, const Vector3d& to_m,
-                     const Vector3d& look_from_m, const Vector3d& look_to_m) {
+CameraPath line_path(Random& random, const LinePlan& plan) {
   constexpr int kKnots = 8;
-  const double sway = 0.015 * (to_m - from_m).norm();
+  const double sway = 0.015 * (plan.to_m - plan.from_m).norm();
   const auto swayed = [&](const Vector3d& p, double amount) {
     const double dx = random.uniform(-amount, amount), dy = random.uniform(-amount, amount);
     const double dz = random.uniform(-0.4, 0.4) * amount;
@@ -133,10 +156,23 @@ CameraPath line_path(Random& random, const Vector3d& from_m, const Vector3d& to_
   CameraPath path;
   for (int k = 0; k < kKnots; ++k) {
     const double t = static_cast<double>(k) / (kKnots - 1);
-    path.eye_m.push_back(swayed(from_m + t * (to_m - from_m), sway));
-    path.target_m.push_back(swayed(look_from_m + t * (look_to_m - look_from_m), 4 * sway));
+    path.eye_m.push_back(swayed(plan.from_m + t * (plan.to_m - plan.from_m), sway));
+    path.target_m.push_back(
+        swayed(plan.look_from_m + t * (plan.look_to_m - plan.look_from_m), 4 * sway));
   }
   return path;
+}
+
+}  // namespace
+
+void arc_walk(SceneBuilder& b, Epoch epoch, int frames, const WalkPlan& plan) {
+  b.scene.path[static_cast<int>(epoch)] = arc_path(b.random, plan);
+  b.scene.frames[static_cast<int>(epoch)] = frames;
+}
+
+void line_walk(SceneBuilder& b, Epoch epoch, int frames, const LinePlan& plan) {
+  b.scene.path[static_cast<int>(epoch)] = line_path(b.random, plan);
+  b.scene.frames[static_cast<int>(epoch)] = frames;
 }
 
 std::vector<Rigid3> sample_path(const SyntheticScene& scene, Epoch epoch, int frames) {

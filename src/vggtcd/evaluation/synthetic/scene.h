@@ -4,6 +4,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <span>
 #include <string>
@@ -31,6 +32,8 @@ struct SceneObject {
   std::optional<Rigid3> world_from_object[2];  // by epoch; absent: not there
 
   ObjectChange change() const;
+  // The box of the mesh in the object's own axes.
+  Eigen::AlignedBox3d box_m() const;
 };
 
 // Light of one epoch. Colours are linear; a lamp's falls off with the squared distance.
@@ -67,9 +70,20 @@ struct SyntheticScene {
 
 // The eleven names: five outdoor, then six indoor.
 std::span<const std::string_view> scene_names();
+// And those of scenes that test a limit and count in no average: `moving_day`, where 40 % of the
+// surface changes.
+std::span<const std::string_view> all_scene_names();
+
+enum class SceneChange {
+  kScene,  // the scene's own list
+  kNone    // nothing: T2 is as T1 was; light and walk still differ
+};
+std::span<const EnumName<SceneChange>> enum_names(SceneChange);
+
 // The scene of that name and seed; the seed varies shapes, places, textures, walks, light and which
 // small things change. Error{kUsage} for an unknown name.
-SyntheticScene make_scene(std::string_view name, uint64_t seed);
+SyntheticScene make_scene(std::string_view name, uint64_t seed,
+                          SceneChange change = SceneChange::kScene);
 
 // The cameras of a walk: camera_from_world, OpenCV axes. The speed varies along the path and the
 // hand shakes, both drawn from the scene's seed.

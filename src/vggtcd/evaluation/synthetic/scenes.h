@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The eleven scenes, one function each; make_scene (scene.h) finds them by name.
+// The scenes, one function each; make_scene (scene.h) finds them by name.
 #pragma once
 
 #include "vggtcd/evaluation/synthetic/scene_builder.h"
@@ -14,10 +14,13 @@ struct WalkPlan {
   double height_m = 1.6;
 };
 // Walks around the centre, the radius, height and target wavering by a few percent.
-CameraPath arc_path(Random& random, const WalkPlan& plan);
-// Walks from one point to another looking at points beside the way.
-CameraPath line_path(Random& random, const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m,
-                     const Eigen::Vector3d& look_from_m, const Eigen::Vector3d& look_to_m);
+void arc_walk(SceneBuilder& b, Epoch epoch, int frames, const WalkPlan& plan);
+
+// From one point to another, looking at points beside the way.
+struct LinePlan {
+  Eigen::Vector3d from_m, to_m, look_from_m, look_to_m;
+};
+void line_walk(SceneBuilder& b, Epoch epoch, int frames, const LinePlan& plan);
 
 void build_driveway(SceneBuilder& b);
 void build_courtyard(SceneBuilder& b);
@@ -31,5 +34,7 @@ void build_kitchen(SceneBuilder& b);
 void build_living_room(SceneBuilder& b);
 void build_desk(SceneBuilder& b);
 void build_worktop(SceneBuilder& b);
+
+void build_moving_day(SceneBuilder& b);
 
 }  // namespace vggtcd

@@ -65,10 +65,8 @@ void build_coffee_corner(SceneBuilder& b) {
   b.clutter(at(1.15, -1.45, 0.91), {0.4, 0.4}, 0.13, {2, 1, 1, 0});
   b.fixed("plant", b.plant(0.9), at(1.75, -1.3, 0));
   b.lamplight(room);
-  b.scene.path[0] = arc_path(b.random, {{0, -1.5, 1.0}, 1.75, 52, 122, 1.5});
-  b.scene.path[1] = arc_path(b.random, {{0, -1.5, 1.02}, 1.6, 138, 68, 1.45});
-  b.scene.frames[0] = 40;
-  b.scene.frames[1] = 32;
+  arc_walk(b, Epoch::kT1, 40, {{0, -1.5, 1.0}, 1.75, 52, 122, 1.5});
+  arc_walk(b, Epoch::kT2, 32, {{0, -1.5, 1.02}, 1.6, 138, 68, 1.45});
   b.scene.scale_t2_from_t1 = 2.2;
 }
 
@@ -104,12 +102,10 @@ void build_hallway(SceneBuilder& b) {
   b.clutter(at(0.55, 2.7, 0), {1.0, 0.6}, 0.22, {3, 1, 1, 0});
   b.clutter(at(-0.75, -0.2, 0.0), {0.5, 1.0}, 0.22, {2, 1, 0, 1});
   b.lamplight(room);
-  b.scene.path[0] =
-      line_path(b.random, {0.1, -2.75, 1.5}, {-0.15, -0.1, 1.55}, {0.1, 0.6, 0.9}, {0.2, 3.0, 0.9});
-  b.scene.path[1] =
-      line_path(b.random, {-0.2, -2.2, 1.6}, {0.1, 0.4, 1.5}, {0.25, 1.0, 0.85}, {0.1, 3.1, 0.9});
-  b.scene.frames[0] = 50;
-  b.scene.frames[1] = 60;
+  line_walk(b, Epoch::kT1, 50,
+            {{0.1, -2.75, 1.5}, {-0.15, -0.1, 1.55}, {0.1, 0.6, 0.9}, {0.2, 3.0, 0.9}});
+  line_walk(b, Epoch::kT2, 60,
+            {{-0.2, -2.2, 1.6}, {0.1, 0.4, 1.5}, {0.25, 1.0, 0.85}, {0.1, 3.1, 0.9}});
   b.scene.scale_t2_from_t1 = 0.55;
 }
 
@@ -134,10 +130,8 @@ void build_kitchen(SceneBuilder& b) {
   b.clutter(at(-1.35, -1.75, 0.91), {0.55, 0.45}, 0.16, {3, 1, 1, 0});
   b.clutter(at(0.7, -1.75, 0.91), {0.4, 0.4}, 0.15, {2, 0, 1, 0});
   b.lamplight(room);
-  b.scene.path[0] = arc_path(b.random, {{-0.2, -1.2, 0.95}, 2.7, 58, 118, 1.6});
-  b.scene.path[1] = arc_path(b.random, {{-0.1, -1.2, 0.95}, 2.5, 132, 62, 1.5});
-  b.scene.frames[0] = 30;
-  b.scene.frames[1] = 30;
+  arc_walk(b, Epoch::kT1, 30, {{-0.2, -1.2, 0.95}, 2.7, 58, 118, 1.6});
+  arc_walk(b, Epoch::kT2, 30, {{-0.1, -1.2, 0.95}, 2.5, 132, 62, 1.5});
   b.scene.scale_t2_from_t1 = 1.1;
 }
 
@@ -162,10 +156,8 @@ void build_living_room(SceneBuilder& b) {
   b.moved("plant", b.plant(1.0), at(-2.6, 0.6, 0), at(-1.9, -2.2, 0));
   b.clutter(at(0, 0.3, 0), {2.6, 1.0}, 0.3, {2, 1, 1, 1});
   b.lamplight(room);
-  b.scene.path[0] = arc_path(b.random, {{0, -1.2, 0.75}, 3.0, 40, 128, 1.6});
-  b.scene.path[1] = arc_path(b.random, {{0.1, -1.2, 0.75}, 2.9, 62, 145, 1.55});
-  b.scene.frames[0] = 70;
-  b.scene.frames[1] = 64;
+  arc_walk(b, Epoch::kT1, 70, {{0, -1.2, 0.75}, 3.0, 40, 128, 1.6});
+  arc_walk(b, Epoch::kT2, 64, {{0.1, -1.2, 0.75}, 2.9, 62, 145, 1.55});
   b.scene.scale_t2_from_t1 = 1.6;
 }
 
@@ -192,10 +184,8 @@ void build_desk(SceneBuilder& b) {
   b.clutter(at(-0.62, -1.45, 0.74), {0.3, 0.35}, 0.14, {4, 0, 0, 0});
   b.fixed("plant", b.plant(0.5), at(0.68, -1.5, 0.74));
   b.lamplight(room);
-  b.scene.path[0] = arc_path(b.random, {{0, -1.25, 0.85}, 1.35, 60, 118, 1.35});
-  b.scene.path[1] = arc_path(b.random, {{0, -1.25, 0.85}, 1.3, 126, 72, 1.3});
-  b.scene.frames[0] = 20;
-  b.scene.frames[1] = 24;
+  arc_walk(b, Epoch::kT1, 20, {{0, -1.25, 0.85}, 1.35, 60, 118, 1.35});
+  arc_walk(b, Epoch::kT2, 24, {{0, -1.25, 0.85}, 1.3, 126, 72, 1.3});
   b.scene.scale_t2_from_t1 = 0.97;
 }
 
@@ -214,10 +204,8 @@ void build_worktop(SceneBuilder& b) {
   b.clutter(at(-0.9, -1.45, 0.91), {0.5, 0.45}, 0.14, {3, 1, 1, 1});
   b.clutter(at(1.1, -1.42, 0.91), {0.35, 0.4}, 0.13, {2, 1, 1, 0});
   b.lamplight(room);
-  b.scene.path[0] = arc_path(b.random, {{0, -1.5, 1.0}, 1.7, 60, 128, 1.5});
-  b.scene.path[1] = arc_path(b.random, {{0, -1.5, 1.0}, 1.6, 52, 116, 1.55});
-  b.scene.frames[0] = 36;
-  b.scene.frames[1] = 36;
+  arc_walk(b, Epoch::kT1, 36, {{0, -1.5, 1.0}, 1.7, 60, 128, 1.5});
+  arc_walk(b, Epoch::kT2, 36, {{0, -1.5, 1.0}, 1.6, 52, 116, 1.55});
   b.scene.scale_t2_from_t1 = 1.0;
 }
 

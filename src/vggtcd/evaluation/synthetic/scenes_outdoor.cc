@@ -67,10 +67,8 @@ void build_driveway(SceneBuilder& b) {
   b.removed("planter", b.plant(1.1), at(-2.3, 2.8, 0));
   b.clutter(at(0.5, 2.4, 0.0), {4.2, 0.9}, 0.28, {3, 1, 1, 1});
   b.daylight();
-  b.scene.path[0] = arc_path(b.random, {{0.5, -0.3, 0.7}, 5.4, -28, 138, 1.6});
-  b.scene.path[1] = arc_path(b.random, {{0.7, -0.2, 0.7}, 5.0, 162, -12, 1.75});
-  b.scene.frames[0] = 84;
-  b.scene.frames[1] = 84;
+  arc_walk(b, Epoch::kT1, 84, {{0.5, -0.3, 0.7}, 5.4, -28, 138, 1.6});
+  arc_walk(b, Epoch::kT2, 84, {{0.7, -0.2, 0.7}, 5.0, 162, -12, 1.75});
   b.scene.scale_t2_from_t1 = 0.45;
 }
 
@@ -96,10 +94,8 @@ void build_courtyard(SceneBuilder& b) {
   b.removed("bicycle", b.bicycle(), at(-4.9, -7.0, 0, -5));
   b.clutter(at(-1.5, -4.4, 0), {3.0, 1.6}, 0.35, {3, 1, 1, 1});
   b.daylight();
-  b.scene.path[0] = arc_path(b.random, {{0.3, -0.4, 0.9}, 6.6, 20, 205, 1.65});
-  b.scene.path[1] = arc_path(b.random, {{0.2, -0.6, 0.9}, 7.0, 75, 262, 1.7});
-  b.scene.frames[0] = 60;
-  b.scene.frames[1] = 48;
+  arc_walk(b, Epoch::kT1, 60, {{0.3, -0.4, 0.9}, 6.6, 20, 205, 1.65});
+  arc_walk(b, Epoch::kT2, 48, {{0.2, -0.6, 0.9}, 7.0, 75, 262, 1.7});
   b.scene.scale_t2_from_t1 = 1.9;
 }
 
@@ -133,10 +129,8 @@ void build_barbecue(SceneBuilder& b) {
   b.added("planter", b.plant(1.0), at(1.7, -2.2, 0));
   b.clutter(at(-2.4, 0.4, 0), {1.2, 1.8}, 0.3, {3, 1, 0, 1});
   b.daylight();
-  b.scene.path[0] = arc_path(b.random, {{0.0, -0.6, 0.6}, 3.5, 12, 128, 1.6});
-  b.scene.path[1] = arc_path(b.random, {{0.1, -0.5, 0.6}, 3.7, 40, 150, 1.5});
-  b.scene.frames[0] = 40;
-  b.scene.frames[1] = 36;
+  arc_walk(b, Epoch::kT1, 40, {{0.0, -0.6, 0.6}, 3.5, 12, 128, 1.6});
+  arc_walk(b, Epoch::kT2, 36, {{0.1, -0.5, 0.6}, 3.7, 40, 150, 1.5});
   b.scene.scale_t2_from_t1 = 1.3;
 }
 
@@ -182,10 +176,8 @@ void build_poolside(SceneBuilder& b) {
   b.clutter(at(-3.4, -2.6, 0.7), {0.75, 0.75}, 0.2, {2, 1, 1, 0});
   b.clutter(at(-4.2, 0.4, 0), {1.6, 2.4}, 0.35, {3, 1, 1, 1});
   b.daylight();
-  b.scene.path[0] = arc_path(b.random, {{0, -0.9, 0.1}, 5.3, 18, 152, 1.9});
-  b.scene.path[1] = arc_path(b.random, {{0, -0.9, 0.1}, 5.0, 172, 48, 2.0});
-  b.scene.frames[0] = 50;
-  b.scene.frames[1] = 50;
+  arc_walk(b, Epoch::kT1, 50, {{0, -0.9, 0.1}, 5.3, 18, 152, 1.9});
+  arc_walk(b, Epoch::kT2, 50, {{0, -0.9, 0.1}, 5.0, 172, 48, 2.0});
   b.scene.scale_t2_from_t1 = 0.7;
 }
 
@@ -225,12 +217,9 @@ void build_street(SceneBuilder& b) {
   b.clutter(at(3, -4.6, 0.12), {18, 1.2}, 0.5, {5, 1, 2, 1});
   b.clutter(at(3, 4.5, 0.12), {16, 1.2}, 0.5, {4, 1, 1, 1});
   b.daylight();
-  b.scene.path[0] =
-      line_path(b.random, {-11, -0.5, 1.6}, {9, 0.4, 1.65}, {0, -3.2, 1.4}, {20, -1.2, 1.4});
-  b.scene.path[1] =
-      line_path(b.random, {-6, 0.6, 1.7}, {13, -0.3, 1.6}, {4, -3.6, 1.4}, {25, -1.5, 1.5});
-  b.scene.frames[0] = 100;
-  b.scene.frames[1] = 80;
+  line_walk(b, Epoch::kT1, 100,
+            {{-11, -0.5, 1.6}, {9, 0.4, 1.65}, {0, -3.2, 1.4}, {20, -1.2, 1.4}});
+  line_walk(b, Epoch::kT2, 80, {{-6, 0.6, 1.7}, {13, -0.3, 1.6}, {4, -3.6, 1.4}, {25, -1.5, 1.5}});
   b.scene.scale_t2_from_t1 = 2.5;
 }
 

@@ -61,14 +61,10 @@ Json json_of(const Eigen::Matrix3d& m) {
 }
 // The box of an object in world axes: centre, rotation (columns are its axes) and size.
 Json box_of(const SceneObject& object, const Rigid3& world_from_object) {
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e30), high = -low;
-  for (const Mesh::Vertex& vertex : object.mesh.vertices) {
-    low = low.cwiseMin(vertex.position_m.cast<double>());
-    high = high.cwiseMax(vertex.position_m.cast<double>());
-  }
-  return {{"center_m", json_of(Eigen::Vector3d(world_from_object * (0.5 * (low + high))))},
+  const Eigen::AlignedBox3d box = object.box_m();
+  return {{"center_m", json_of(Eigen::Vector3d(world_from_object * box.center()))},
           {"rotation", json_of(world_from_object.rotation)},
-          {"size_m", json_of(Eigen::Vector3d(high - low))}};
+          {"size_m", json_of(Eigen::Vector3d(box.sizes()))}};
 }
 
 // How often an object appears: pixels that are evaluated as changed, per epoch.
@@ -99,17 +95,6 @@ Json objects_json(const SyntheticScene& scene, const SceneTruth& truth) {
     list.push_back(std::move(entry));
   }
   return list;
-}
-
-double changed_share(const SceneTruth& truth) {
-  int64_t changed = 0, surface = 0;
-  for (const EpochTruth& epoch : truth.epoch) {
-    for (size_t pixel = 0; pixel < epoch.label.size(); ++pixel) {
-      surface += epoch.object[pixel] != 0;
-      changed += epoch.label[pixel] == kLabelChanged;
-    }
-  }
-  return static_cast<double>(changed) / static_cast<double>(std::max<int64_t>(1, surface));
 }
 
 }  // namespace
