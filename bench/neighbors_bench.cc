@@ -2,11 +2,10 @@
 // Nearest neighbours of full-size clouds and the fine stage, against nanoflann here and against
 // scipy and numpy in bench/peers/neighbors_peer.py, which reads what this writes. Run by
 // bench/run_neighbors.
-// Usage: neighbors_bench DIRECTORY [--frames N]      frames an epoch, default 84
+// Usage: neighbors_bench SCENE DIRECTORY      SCENE holds t1.npz, t2.npz and joint.npz
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -17,12 +16,14 @@
 #include <thread>
 #include <vector>
 
-#include "bench/depth_scene.h"
 #include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/geometry/nearest_neighbors.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
+#include "vggtcd/io/predictions.h"
+#include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
@@ -30,13 +31,13 @@
 namespace vggtcd::bench {
 namespace {
 
-using Points = std::vector<Eigen::Vector3f>;
+using Points = std::span<const Eigen::Vector3f>;
 
-template <typename T>
-void write(const std::filesystem::path& path, const std::vector<T>& values) {
+template <typename Values>
+void write(const std::filesystem::path& path, const Values& values) {
   std::ofstream file(path, std::ios::binary);
   file.write(reinterpret_cast<const char*>(values.data()),
-             static_cast<std::streamsize>(values.size() * sizeof(T)));
+             static_cast<std::streamsize>(values.size() * sizeof(*values.data())));
   if (!file) throw_error(ErrorCode::kOutput, "{}: cannot be written", path.string());
 }
 
@@ -67,7 +68,7 @@ struct Directions {
   double cpu_s() const { return build.cpu_s + query.cpu_s; }
 };
 
-Directions ours(const Points& t1, const Points& t2, float bound) {
+Directions ours(Points t1, Points t2, float bound) {
   Directions result;
   result.distance_t1.resize(t1.size());
   result.distance_t2.resize(t2.size());
@@ -85,7 +86,7 @@ Directions ours(const Points& t1, const Points& t2, float bound) {
 // result set that starts at the bound and keeps one neighbour, queries in the order of the pixels
 // (which are neighbours).
 struct NanoflannCloud {
-  const Points& points;
+  Points points;
   size_t kdtree_get_point_count() const { return points.size(); }
   float kdtree_get_pt(size_t i, size_t axis) const {
     return points[i][static_cast<Eigen::Index>(axis)];
@@ -112,7 +113,7 @@ using NanoflannTree =
     nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, NanoflannCloud>,
                                         NanoflannCloud, 3, uint32_t>;
 
-void query_nanoflann(const NanoflannTree& tree, const Points& queries, float bound,
+void query_nanoflann(const NanoflannTree& tree, Points queries, float bound,
                      std::vector<float>& distance) {
   distance.resize(queries.size());
   parallel_for(static_cast<int64_t>(queries.size()), 4096, [&](int64_t begin, int64_t end) {
@@ -124,7 +125,7 @@ void query_nanoflann(const NanoflannTree& tree, const Points& queries, float bou
   });
 }
 
-Directions with_nanoflann(const Points& t1, const Points& t2, float bound, size_t leaf_size) {
+Directions with_nanoflann(Points t1, Points t2, float bound, size_t leaf_size) {
   Directions result;
   const NanoflannCloud cloud_t1{t1}, cloud_t2{t2};
   const nanoflann::KDTreeSingleIndexAdaptorParams params(leaf_size);
@@ -142,7 +143,7 @@ Directions with_nanoflann(const Points& t1, const Points& t2, float bound, size_
 }
 
 // Distances by definition, for a random sample.
-int64_t differing_from_brute_force(const Points& queries, const Points& targets, float bound,
+int64_t differing_from_brute_force(Points queries, Points targets, float bound,
                                    const std::vector<float>& distance) {
   constexpr int64_t kSamples = 400;
   std::vector<int> differs(kSamples, 0);
@@ -162,11 +163,11 @@ int64_t differing_from_brute_force(const Points& queries, const Points& targets,
 }
 
 // Everything the peer needs to do the same and to compare.
-void write_for_peer(const std::filesystem::path& directory, const DepthScene& scene,
-                    const Points& t1, const Points& t2, const Directions& found) {
+void write_for_peer(const std::filesystem::path& directory, const Reconstruction& before,
+                    const Reconstruction& after, Points t1, Points t2, const Directions& found) {
   const float everything = -std::numeric_limits<float>::infinity();
-  const PointCloud all_t1 = unproject(scene.before, everything);
-  const PointCloud all_t2 = unproject(scene.after, everything);
+  const PointCloud all_t1 = unproject(before, everything);
+  const PointCloud all_t2 = unproject(after, everything);
   write(directory / "all_t1.f32", all_t1.positions);
   write(directory / "all_t2.f32", all_t2.positions);
   write(directory / "confidence_t1.f32", all_t1.confidence);
@@ -187,21 +188,24 @@ int64_t count_different(const std::vector<float>& a, const std::vector<float>& b
 }
 
 int run(int argc, char** argv) {
-  if (argc < 2) throw_error(ErrorCode::kUsage, "usage: neighbors_bench DIRECTORY [--frames N]");
-  const std::filesystem::path directory = argv[1];
-  const int frames = argc == 4 && std::strcmp(argv[2], "--frames") == 0 ? std::stoi(argv[3]) : 84;
-  const DepthScene scene = make_depth_scene(frames, 7);
-  // As the alignment leaves it: about 0.2 % of the extent off.
-  Sim3 aligned = scene.t2_from_t1;
-  aligned.translation += Eigen::Vector3d(0.002, -0.001, 0.002);
-  const Points t1 = unproject(scene.before, confidence_threshold(scene.before), aligned).positions;
-  const Points t2 = unproject(scene.after, confidence_threshold(scene.after)).positions;
-  const float bound = static_cast<float>(0.02 * robust_extent(t2));
+  if (argc != 3) throw_error(ErrorCode::kUsage, "usage: neighbors_bench SCENE DIRECTORY");
+  const std::filesystem::path scene = argv[1], directory = argv[2];
+  ProgressSink& silent = silent_progress();
+  const Reconstruction before = read_reconstruction(scene / "t1.npz", silent);
+  const Reconstruction after = read_reconstruction(scene / "t2.npz", silent);
+  const Sim3 aligned =
+      align_coarse(before, after, read_joint(scene / "joint.npz", before, after, silent), {})
+          .t2_from_t1;
+  const PointCloud cloud_t1 = unproject(before, confidence_threshold(before), aligned);
+  const PointCloud cloud_t2 = unproject(after, confidence_threshold(after));
+  const Points t1 = cloud_t1.positions, t2 = cloud_t2.positions;
+  const double extent = robust_extent(t2);
+  const float bound = static_cast<float>(0.02 * extent);
 
   nlohmann::json report;
   report["isa"] = enum_to_string(cpu_level());
   report["threads"] = num_threads();
-  report["frames"] = frames;
+  report["frames"] = {before.num_frames(), after.num_frames()};
   report["points"] = {t1.size(), t2.size()};
   report["bound"] = bound;
 
@@ -223,12 +227,15 @@ int run(int argc, char** argv) {
                                       differing_from_brute_force(t2, t1, bound, mine.distance_t2);
   report["beyond_bound"] = std::count(mine.distance_t1.begin(), mine.distance_t1.end(), bound) +
                            std::count(mine.distance_t2.begin(), mine.distance_t2.end(), bound);
+  for (const auto* distance : {&mine.distance_t1, &mine.distance_t2}) {
+    report["median_of_extent"].push_back(median(*distance) / extent);
+  }
 
   Cost fine_cost{0, std::numeric_limits<double>::max()};
   FineResult fine;
   for (int repeat = 0; repeat < 3; ++repeat) {
     const Stopwatch stopwatch;
-    fine = align_fine(scene.before, scene.after, aligned, FineOptions{});
+    fine = align_fine(before, after, aligned, FineOptions{});
     if (const Cost cost = stopwatch.cost(); cost.cpu_s < fine_cost.cpu_s) fine_cost = cost;
   }
   const Eigen::Vector3d& t = fine.t2_from_t1.translation;
@@ -245,7 +252,7 @@ int run(int argc, char** argv) {
   report["coarse"] = {
       {"scaled_rotation", matrix},
       {"translation", {aligned.translation.x(), aligned.translation.y(), aligned.translation.z()}}};
-  write_for_peer(directory, scene, t1, t2, mine);
+  write_for_peer(directory, before, after, t1, t2, mine);
   std::ofstream(directory / "ours.json") << report.dump(1) << '\n';
   return 0;
 }
