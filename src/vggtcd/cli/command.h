@@ -49,7 +49,8 @@ template <typename Field>
 void add_field(CLI::App* command, std::string_view name, Field& field, std::string_view help) {
   const std::string flag = flag_of(name);
   if constexpr (std::is_same_v<Field, bool>) {
-    command->add_flag(flag + ",!--no-" + flag.substr(2), field, std::string(help));
+    command->add_flag(flag + ",!--no-" + flag.substr(2), field,
+                      std::string(help) + (field ? " [on]" : " [off]"));
   } else if constexpr (std::is_enum_v<Field>) {
     std::string names;
     for (const auto& entry : enum_names(Field{})) {

@@ -6,6 +6,7 @@
 #include <new>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/manual_page.h"
 #include "vggtcd/cli/terminal_progress.h"
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
@@ -22,6 +23,7 @@ int fail(ErrorCode code, std::string_view what) {
 int run(int argc, char** argv) {
   Program program;
   program.app.name("vggt-cd");
+  program.app.formatter(std::make_shared<ManualPage>());
   program.app.description("Tells what changed in 3D between two sets of photos of one place.");
   program.app.set_version_flag("--version", std::string("vggt-cd ") + kVersion);
   program.app.require_subcommand(1);
