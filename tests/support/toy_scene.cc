@@ -38,6 +38,16 @@ double depth_along(const ToyScene& scene, const Eigen::Vector3d& origin,
 
 }  // namespace
 
+double flat_relief(double, double) { return 0.0; }
+double box_relief(double x, double y) {
+  return x > 0.2 && x < 0.8 && std::abs(y) < 0.3 ? 0.5 : 0.0;
+}
+
+const Sim3 kT2FromT1{
+    1.7,
+    Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 1, 1).normalized()).toRotationMatrix(),
+    {3, 2, 1}};
+
 Reconstruction reconstruct(const ToyScene& scene, const Sim3& frame_from_scene) {
   Reconstruction r;
   r.width = scene.width;

@@ -18,6 +18,13 @@ struct ToyScene {
   std::function<double(double x, double y)> relief = [](double, double) { return 0.0; };
 };
 
+// What the tests of change compare: a plane, and a box 0.5 high on it (0.2 < x < 0.8, |y| < 0.3).
+double flat_relief(double x, double y);
+double box_relief(double x, double y);
+
+// A similarity that no test can take for the identity: scale 1.7, all axes turned and moved.
+extern const Sim3 kT2FromT1;
+
 // Cameras walk along x at z = 0 and look towards +z. Depth by marching along the ray; confidence
 // falls with the pixel's distance to the image centre; colour is a checkerboard of the surface. The
 // world of the result is frame_from_scene * scene.

@@ -14,6 +14,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/core/splitmix64.h"
 #include "vggtcd/io/safetensors.h"
 
 namespace vggtcd::testing {
@@ -90,13 +91,6 @@ std::string network_config_json(const NetworkSizes& s) {
       s.image_size, s.embed_dim, s.depth, s.num_heads, s.vit_depth, s.num_heads, 2 * s.embed_dim,
       s.camera_num_heads, s.dpt_features, fmt::join(s.dpt_out_channels, ", "),
       fmt::join(s.dpt_layers, ", "));
-}
-
-uint64_t splitmix64(uint64_t x) {
-  uint64_t z = x + 0x9E3779B97F4A7C15u;
-  z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9u;
-  z = (z ^ (z >> 27)) * 0x94D049BB133111EBu;
-  return z ^ (z >> 31);
 }
 
 uint64_t fnv1a64(std::string_view text) {

@@ -35,12 +35,9 @@ using TensorSpec = NamedShape;
 inline constexpr std::array<std::string_view, 4> kAllModules = kNetworkModules;
 
 // The recipe. `index` counts in C order.
-//   splitmix64(x): z = x + 0x9E3779B97F4A7C15; z = (z ^ z>>30) * 0xBF58476D1CE4E5B9;
-//                  z = (z ^ z>>27) * 0x94D049BB133111EB; z ^ z>>31
 //   key = fnv1a64(name) ^ splitmix64(seed)
 //   u = (splitmix64(key + index) >> 40) * 2^-23 - 1, in [-1, 1)
 //   value = float(offset + scale * u), offset and scale chosen by name and shape
-uint64_t splitmix64(uint64_t x);
 uint64_t fnv1a64(std::string_view text);
 void fill_by_recipe(const TensorSpec& spec, uint64_t seed, float* values);  // in parallel
 

@@ -9,6 +9,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "vggtcd/core/splitmix64.h"
+
 namespace vggtcd::testing {
 namespace {
 

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "tests/support/toy_scene.h"
@@ -14,16 +13,11 @@
 namespace vggtcd {
 namespace {
 
+using testing_support::box_relief;
+using testing_support::flat_relief;
+using testing_support::kT2FromT1;
 using testing_support::reconstruct;
 using testing_support::ToyScene;
-
-double flat(double, double) { return 0.0; }
-double with_box(double x, double y) { return x > 0.2 && x < 0.8 && std::abs(y) < 0.3 ? 0.5 : 0.0; }
-
-const Sim3 kT2FromT1{
-    1.7,
-    Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 1, 1).normalized()).toRotationMatrix(),
-    {3, 2, 1}};
 
 ToyScene scene(double (*relief)(double, double), double offset) {
   return {.frames = 5, .width = 96, .height = 72, .camera_offset = offset, .relief = relief};
@@ -35,8 +29,8 @@ Eigen::Vector3d in_scene(const Reconstruction& r, size_t pixel) {
 }
 
 TEST(FreeSpaceChanges, ABoxThatAppearedIsAddedAndTheRestUnchanged) {
-  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
   int box = 0, box_added = 0, plane = 0, plane_added = 0;
   for (size_t i = 0; i < after.num_pixels(); ++i) {
@@ -58,8 +52,8 @@ TEST(FreeSpaceChanges, ABoxThatAppearedIsAddedAndTheRestUnchanged) {
 }
 
 TEST(FreeSpaceChanges, WhatTheBoxHidesIsNotCalledRemoved) {
-  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
   int removed = 0, judged = 0;
   for (const ChangeLabel label : change.t1.label) {
@@ -71,8 +65,8 @@ TEST(FreeSpaceChanges, WhatTheBoxHidesIsNotCalledRemoved) {
 }
 
 TEST(FreeSpaceChanges, ABoxThatVanishedIsRemoved) {
-  const Reconstruction before = reconstruct(scene(with_box, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(flat, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(box_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(flat_relief, 0.1), kT2FromT1);
   const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
   int removed_on_box = 0, removed_elsewhere = 0;
   for (size_t i = 0; i < before.num_pixels(); ++i) {
@@ -86,8 +80,9 @@ TEST(FreeSpaceChanges, ABoxThatVanishedIsRemoved) {
 }
 
 TEST(FreeSpaceChanges, WhatTheOtherEpochNeverSawIsUnobserved) {
-  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(flat, 50.0), Sim3{});  // a walk somewhere else
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after =
+      reconstruct(scene(flat_relief, 50.0), Sim3{});  // a walk somewhere else
   const FreeSpaceChange change = free_space_changes(before, after, Sim3{}, {});
   for (const ChangeLabel label : change.t1.label) {
     EXPECT_TRUE(label == ChangeLabel::kUnobserved || label == ChangeLabel::kNoEvidence);
@@ -95,8 +90,8 @@ TEST(FreeSpaceChanges, WhatTheOtherEpochNeverSawIsUnobserved) {
 }
 
 TEST(FreeSpaceChanges, AnUnchangedSceneHasNoChanges) {
-  const Reconstruction before = reconstruct(scene(with_box, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(box_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
   int changed = 0;
   for (const auto* labels : {&change.t1.label, &change.t2.label}) {
@@ -108,8 +103,8 @@ TEST(FreeSpaceChanges, AnUnchangedSceneHasNoChanges) {
 }
 
 TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
-  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   set_num_threads(1);
   const FreeSpaceChange one = free_space_changes(before, after, kT2FromT1, {});
   set_num_threads(5);
@@ -123,7 +118,7 @@ TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
 }
 
 TEST(OverlappingViews, RanksTheViewFromTheSamePlaceFirst) {
-  const Reconstruction walk = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction walk = reconstruct(scene(flat_relief, 0), Sim3{});
   const auto views = overlapping_views(walk, walk, Sim3{}, 2);
   for (size_t i = 0; i < views.size(); ++i) {
     ASSERT_EQ(views[i].size(), 2u);

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -14,21 +13,15 @@
 namespace vggtcd {
 namespace {
 
+using testing_support::box_relief;
+using testing_support::flat_relief;
+using testing_support::kT2FromT1;
 using testing_support::reconstruct;
 using testing_support::ToyScene;
 
-double flat(double, double) { return 0.0; }
-// A box 0.5 high on the plane.
-double with_box(double x, double y) { return x > 0.2 && x < 0.8 && std::abs(y) < 0.3 ? 0.5 : 0.0; }
-
-const Sim3 kT2FromT1{
-    1.7,
-    Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 1, 1).normalized()).toRotationMatrix(),
-    {3, 2, 1}};
-
 TEST(DetectChanges, FindsABoxThatAppearedAndNothingElse) {
-  const Reconstruction before = reconstruct({.frames = 4, .relief = flat}, Sim3{});
-  const ToyScene after_scene{.frames = 4, .camera_offset = 0.1, .relief = with_box};
+  const Reconstruction before = reconstruct({.frames = 4, .relief = flat_relief}, Sim3{});
+  const ToyScene after_scene{.frames = 4, .camera_offset = 0.1, .relief = box_relief};
   const Reconstruction after = reconstruct(after_scene, kT2FromT1);
   const ChangeSet changes =
       detect_changes(before, after, kT2FromT1, {.threshold_fraction = 0.04, .bound_fraction = 0.1});
@@ -52,9 +45,9 @@ TEST(DetectChanges, FindsABoxThatAppearedAndNothingElse) {
 
 TEST(DetectChanges, ScoresAreTheDistancesOfBruteForceCutAtTheBound) {
   const Reconstruction before =
-      reconstruct({.frames = 2, .width = 24, .height = 18, .relief = flat}, Sim3{});
+      reconstruct({.frames = 2, .width = 24, .height = 18, .relief = flat_relief}, Sim3{});
   const Reconstruction after = reconstruct(
-      {.frames = 2, .width = 24, .height = 18, .camera_offset = 0.3, .relief = with_box},
+      {.frames = 2, .width = 24, .height = 18, .camera_offset = 0.3, .relief = box_relief},
       kT2FromT1);
   const ChangeSet changes = detect_changes(before, after, kT2FromT1,
                                            {.threshold_fraction = 0.02, .bound_fraction = 0.05});
@@ -72,8 +65,8 @@ TEST(DetectChanges, ScoresAreTheDistancesOfBruteForceCutAtTheBound) {
 }
 
 TEST(DetectChanges, PixelsWithoutEvidenceHaveNoScore) {
-  Reconstruction before = reconstruct({.frames = 2, .relief = flat}, Sim3{});
-  const Reconstruction after = reconstruct({.frames = 2, .relief = flat}, Sim3{});
+  Reconstruction before = reconstruct({.frames = 2, .relief = flat_relief}, Sim3{});
+  const Reconstruction after = reconstruct({.frames = 2, .relief = flat_relief}, Sim3{});
   before.depth[1000] = 0;
   const ChangeSet changes = detect_changes(before, after, Sim3{}, {});
   EXPECT_TRUE(std::isnan(changes.t1.score[1000]));

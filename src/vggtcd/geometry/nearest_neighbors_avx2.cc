@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nearest-neighbour search for AVX2: 16 floats in two registers.
-#include <immintrin.h>
-
 #include <cstdint>
 
+#include "vggtcd/core/intrinsics.h"
 #include "vggtcd/geometry/nearest_neighbors_kernel.h"
 
 namespace vggtcd {
@@ -24,6 +23,15 @@ struct Avx2Lanes {
     const __m256i values = _mm256_set1_epi32(value);
     _mm256_maskstore_epi32(p, _mm256_castps_si256(where.a), values);
     _mm256_maskstore_epi32(p + 8, _mm256_castps_si256(where.b), values);
+  }
+  static Avx2Lanes with_lane(Avx2Lanes x, int lane, float value) {
+    const __m256i is_lane_a =
+        _mm256_cmpeq_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7), _mm256_set1_epi32(lane));
+    const __m256i is_lane_b = _mm256_cmpeq_epi32(_mm256_setr_epi32(8, 9, 10, 11, 12, 13, 14, 15),
+                                                 _mm256_set1_epi32(lane));
+    const __m256 values = _mm256_set1_ps(value);
+    return {_mm256_blendv_ps(x.a, values, _mm256_castsi256_ps(is_lane_a)),
+            _mm256_blendv_ps(x.b, values, _mm256_castsi256_ps(is_lane_b))};
   }
   void store(float* p) const {
     _mm256_store_ps(p, a);

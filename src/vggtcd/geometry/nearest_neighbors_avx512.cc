@@ -1,17 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nearest-neighbour search for AVX-512: 16 floats in one register.
-
-// g++ 12 takes the intrinsics' own "undefined" operands for mistakes (its bug 105593).
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wuninitialized"
-#if !defined(__clang__)
-#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
-#endif
-#include <immintrin.h>
-#pragma GCC diagnostic pop
-
 #include <cstdint>
 
+#include "vggtcd/core/intrinsics.h"
 #include "vggtcd/geometry/nearest_neighbors_kernel.h"
 
 namespace vggtcd {
@@ -26,6 +17,9 @@ struct Avx512Lanes {
   static uint32_t bits(Mask mask) { return mask; }
   static void assign(Mask where, int32_t value, int32_t* aligned) {
     _mm512_mask_store_epi32(aligned, where, _mm512_set1_epi32(value));
+  }
+  static Avx512Lanes with_lane(Avx512Lanes a, int lane, float value) {
+    return {_mm512_mask_mov_ps(a.v, static_cast<__mmask16>(1u << lane), _mm512_set1_ps(value))};
   }
   void store(float* aligned) const { _mm512_store_ps(aligned, v); }
 

@@ -4,9 +4,9 @@
 // linkage.
 #pragma once
 
-#include <immintrin.h>
-
 #include <cstdint>
+
+#include "vggtcd/core/intrinsics.h"
 
 namespace vggtcd {
 namespace {

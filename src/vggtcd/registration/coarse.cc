@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "vggtcd/core/splitmix64.h"
 #include "vggtcd/geometry/umeyama.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
@@ -17,23 +18,14 @@ struct PixelPair {
   uint32_t in_joint;
 };
 
-// splitmix64, a full-period generator with one word of state.
-uint64_t next_random(uint64_t& state) {
-  state += 0x9e3779b97f4a7c15u;
-  uint64_t z = state;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 // Selection sampling: every subset of `count` elements is equally likely, the order stays.
 std::vector<PixelPair> subsample(const std::vector<PixelPair>& all, size_t count, uint64_t seed) {
   if (all.size() <= count) return all;
   std::vector<PixelPair> chosen;
   chosen.reserve(count);
   uint64_t state = seed;
-  for (size_t i = 0; chosen.size() < count; ++i) {
-    const double uniform = static_cast<double>(next_random(state) >> 11) * 0x1p-53;  // [0, 1)
+  for (size_t i = 0; chosen.size() < count; ++i, state += kSplitMix64Step) {
+    const double uniform = unit_interval(splitmix64(state));
     const size_t left = all.size() - i;
     if (uniform * static_cast<double>(left) < static_cast<double>(count - chosen.size())) {
       chosen.push_back(all[i]);

@@ -10,6 +10,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/core/splitmix64.h"
 #include "vggtcd/geometry/order_statistics.h"
 
 namespace vggtcd {
@@ -38,14 +39,6 @@ Quantized quantize(const Eigen::Vector3f& x, const QuantizationBox& box) {
         static_cast<uint16_t>(std::lround(std::clamp(share, 0.0f, 1.0f) * kSteps));
   }
   return q;
-}
-
-// splitmix64 (Steele, Lea, Flood 2014), as a hash of a counter.
-uint64_t hash(uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
 }
 
 bool is_changed_label(uint8_t label) { return label == 1 || label == 2 || label == 4; }
@@ -109,8 +102,8 @@ std::vector<uint32_t> spread_sample(std::span<const uint32_t> indices, int64_t c
   sample.reserve(static_cast<size_t>(count));
   for (int64_t k = 0; k < count; ++k) {  // one at random out of each of `count` equal stretches
     const int64_t begin = k * size / count, end = (k + 1) * size / count;
-    const auto offset =
-        static_cast<int64_t>(hash(static_cast<uint64_t>(k)) % static_cast<uint64_t>(end - begin));
+    const auto offset = static_cast<int64_t>(splitmix64(static_cast<uint64_t>(k)) %
+                                             static_cast<uint64_t>(end - begin));
     sample.push_back(indices[static_cast<size_t>(begin + offset)]);
   }
   return sample;

@@ -10,6 +10,7 @@
 
 #include "tests/support/golden_case.h"
 #include "tests/support/weight_recipe.h"
+#include "vggtcd/core/splitmix64.h"
 #include "vggtcd/nn/reference.h"
 
 namespace vggtcd {
@@ -147,7 +148,7 @@ struct Naive {
 std::vector<float> small_numbers(size_t count, float size) {
   std::vector<float> values(count);
   for (size_t i = 0; i < count; ++i) {
-    const uint64_t bits = testing::splitmix64(i) >> 40;
+    const uint64_t bits = splitmix64(i) >> 40;
     values[i] = size * (static_cast<float>(bits) * 0x1p-23f - 1.0f);
   }
   return values;

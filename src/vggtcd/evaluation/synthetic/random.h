@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Random: a small generator whose numbers depend on the seed alone, not on the standard library
-// (std::normal_distribution differs between implementations). SplitMix64 of Steele et al. 2014.
+// (std::normal_distribution differs between implementations).
 #pragma once
 
 #include <cmath>
@@ -8,17 +8,11 @@
 #include <initializer_list>
 #include <numbers>
 
+#include "vggtcd/core/splitmix64.h"
+
 namespace vggtcd {
 
-// One step of SplitMix64: a bijection of 64 bits that leaves no visible pattern.
-constexpr uint64_t mix64(uint64_t x) {
-  x += 0x9E3779B97F4A7C15ull;
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ull;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EBull;
-  return x ^ (x >> 31);
-}
-
-constexpr uint64_t mix64(uint64_t a, uint64_t b) { return mix64(a ^ mix64(b)); }
+constexpr uint64_t mix64(uint64_t a, uint64_t b) { return splitmix64(a ^ splitmix64(b)); }
 
 class Random {
  public:
@@ -28,8 +22,8 @@ class Random {
     for (const uint64_t key : keys) state_ = mix64(state_, key);
   }
 
-  uint64_t next() { return mix64(state_++ * 0xD1342543DE82EF95ull); }
-  double uniform() { return static_cast<double>(next() >> 11) * 0x1.0p-53; }  // [0, 1)
+  uint64_t next() { return splitmix64(state_++ * 0xD1342543DE82EF95ull); }
+  double uniform() { return unit_interval(next()); }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   int below(int count) {  // 0 .. count-1
     return static_cast<int>(next() % static_cast<uint64_t>(count));
