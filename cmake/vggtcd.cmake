@@ -26,10 +26,11 @@ function(vggtcd_compile_options target)
   endif()
 endfunction()
 
-# vggtcd_module(ROOM SOURCES a.cc ... [DEPS other_rooms_and_libs ...] [PRIVATE_DEPS ...])
-# One static library vggtcd_ROOM, alias vggtcd::ROOM, installed and exported.
+# vggtcd_module(ROOM SOURCES a.cc ... [DEPS other_rooms_and_libs ...] [PRIVATE_DEPS ...] [INTERNAL a.h ...])
+# One static library vggtcd_ROOM, alias vggtcd::ROOM, installed and exported with its headers, but for the INTERNAL ones,
+# which no other room includes.
 function(vggtcd_module room)
-  cmake_parse_arguments(arg "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPS;PRIVATE_DEPS;INTERNAL" ${ARGN})
   add_library(vggtcd_${room} STATIC ${arg_SOURCES})
   add_library(vggtcd::${room} ALIAS vggtcd_${room})
   set_target_properties(vggtcd_${room} PROPERTIES EXPORT_NAME ${room})
@@ -38,8 +39,12 @@ function(vggtcd_module room)
   target_link_libraries(vggtcd_${room} PUBLIC ${arg_DEPS} PRIVATE ${arg_PRIVATE_DEPS})
   vggtcd_compile_options(vggtcd_${room})
   install(TARGETS vggtcd_${room} EXPORT vggtcdTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  set(internal)
+  foreach(header ${arg_INTERNAL})
+    list(APPEND internal PATTERN ${header} EXCLUDE)
+  endforeach()
   install(DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/vggtcd/${room}
-          FILES_MATCHING PATTERN "*.h")
+          FILES_MATCHING PATTERN "*.h" ${internal})
 endfunction()
 
 # vggtcd_test(NAME SOURCES a_test.cc ... [DEPS ...] [LABELS unit] [TIMEOUT 60])
