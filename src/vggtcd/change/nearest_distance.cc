@@ -17,10 +17,9 @@ namespace {
 // The confident points of an epoch in T2, in pixel order. Which pixels they belong to is not kept:
 // it follows from the same walk over the photos, and at full size every array here has 8.5 million
 // entries.
-std::vector<Eigen::Vector3f> confident_points(const Reconstruction& epoch, float min_confidence,
-                                              const Sim3& t2_from_epoch, const char* name) {
-  std::vector<Eigen::Vector3f> positions =
-      unproject(epoch, min_confidence, t2_from_epoch).positions;
+LargeArray<Eigen::Vector3f> confident_points(const Reconstruction& epoch, float min_confidence,
+                                             const Sim3& t2_from_epoch, const char* name) {
+  LargeArray<Eigen::Vector3f> positions = unproject_positions(epoch, min_confidence, t2_from_epoch);
   if (positions.empty()) {
     throw_error(ErrorCode::kDegenerate, "{} epoch: no point is left above the median confidence",
                 name);
@@ -65,7 +64,7 @@ ChangeSet detect_changes(const Reconstruction& before, const Reconstruction& aft
     // comes.
     const NearestNeighborIndex index_t1(
         confident_points(before, min_confidence_t1, t2_from_t1, "before"));
-    std::vector<Eigen::Vector3f> positions_t2 =
+    LargeArray<Eigen::Vector3f> positions_t2 =
         confident_points(after, min_confidence_t2, {}, "after");
     result.scene_extent_u = robust_extent(positions_t2);
     result.threshold_u = options.threshold_fraction * result.scene_extent_u;

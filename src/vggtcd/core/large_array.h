@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // LargeArray: uninitialised memory for millions of elements, on huge pages where the system has
-// them. std::vector would first write zeros on one thread, a page fault every 4 KiB.
+// them. std::vector would first write zeros on one thread, a page fault every 4 KiB. Elements are
+// to be assigned before they are read.
 #pragma once
 
 #include <sys/mman.h>
@@ -16,7 +17,8 @@ namespace vggtcd {
 
 template <typename T>
 class LargeArray {
-  static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
+  // Nothing is constructed; Eigen's vectors do not mind, although they are not formally trivial.
+  static_assert(std::is_trivially_destructible_v<T>);
 
  public:
   LargeArray() = default;

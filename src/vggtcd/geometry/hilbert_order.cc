@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hilbert order by a table of the curve's 24 orientations and a radix sort.
+// Hilbert order by a table of the curve's 24 orientations: points go to buckets of a coarse curve,
+// most of which fit in a cache, and are sorted there.
 #include "vggtcd/geometry/hilbert_order.h"
 
 #include <algorithm>
@@ -70,23 +71,72 @@ constexpr std::array<uint32_t, 1 << kBitsPerAxis> make_spread() {
 constexpr std::array<uint32_t, 24 * 64> kDoubleSteps = make_double_steps();
 constexpr std::array<uint32_t, 1 << kBitsPerAxis> kSpread = make_spread();
 
+// The first `double_steps` of the five digit pairs of a cell's key.
+template <int double_steps>
 inline uint32_t key_of_cell(uint32_t x, uint32_t y, uint32_t z) {
   const uint32_t octants = kSpread[x] | kSpread[y] << 1 | kSpread[z] << 2;
   uint32_t key = 0, orientation = 0;
-  for (int shift = 24; shift >= 0; shift -= 6) {
-    const uint32_t steps = kDoubleSteps[orientation | (octants >> shift & 63u)];
+  for (int step = 0; step < double_steps; ++step) {
+    const uint32_t steps = kDoubleSteps[orientation | (octants >> (24 - 6 * step) & 63u)];
     key = key << 6 | (steps & 63u);
     orientation = steps >> 6;
   }
   return key;
 }
 
+constexpr int kDoubleStepsOfKey = 5, kDoubleStepsOfBucket = 2;
+constexpr size_t kBuckets = 1 << 6 * kDoubleStepsOfBucket;
+
 struct Bounds {
   Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array3f high = -low;
 };
 
-// The bounding cube of some points, divided into cells.
+Eigen::Array3f array_of(const Eigen::Vector3f& x) { return x.array(); }
+Eigen::Array3f array_of(const IndexedPoint& p) { return {p.x, p.y, p.z}; }
+
+constexpr int64_t kGrain = 1 << 16;
+
+template <typename Point>
+Bounds bounds_of(std::span<Point> points) {
+  const auto size = static_cast<int64_t>(points.size());
+  std::vector<Bounds> partial(static_cast<size_t>(num_chunks(size, kGrain)));
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    Bounds bounds;
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      bounds.low = bounds.low.min(array_of(points[i]));
+      bounds.high = bounds.high.max(array_of(points[i]));
+    }
+    partial[static_cast<size_t>(begin / kGrain)] = bounds;
+  });
+  Bounds all;
+  for (const Bounds& bounds : partial) {
+    all.low = all.low.min(bounds.low);
+    all.high = all.high.max(bounds.high);
+  }
+  return all;
+}
+
+// The box of most points, by the 2nd and 98th percentile of a sample, with a margin. What it leaves
+// out costs a little order at its border; a box of all points could be mostly empty.
+Bounds bounds_of_most(std::span<const Eigen::Vector3f> points) {
+  constexpr size_t kSample = 4096;
+  const size_t stride = std::max<size_t>(1, points.size() / kSample);
+  Bounds bounds;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float> sample;
+    for (size_t i = 0; i < points.size(); i += stride) sample.push_back(points[i][axis]);
+    std::ranges::sort(sample);
+    const float low = sample[sample.size() / 50],
+                high = sample[sample.size() - 1 - sample.size() / 50];
+    const float margin = (high - low) / 4;
+    bounds.low[axis] = low - margin;
+    bounds.high[axis] = high + margin;
+  }
+  return bounds;
+}
+
+// A cube divided into cells; what is outside counts to the nearest cell.
 class CellGrid {
  public:
   explicit CellGrid(const Bounds& bounds)
@@ -97,148 +147,120 @@ class CellGrid {
   bool is_divisible() const {
     return side_ > 0 && cells_per_unit_ < std::numeric_limits<float>::max();
   }
-  uint32_t key(const Eigen::Vector3f& x) const {
-    const Eigen::Array3i cell =
-        ((x.array() - low_) * cells_per_unit_).min(kCellsPerAxis - 1).cast<int>();
-    return key_of_cell(static_cast<uint32_t>(cell.x()), static_cast<uint32_t>(cell.y()),
-                       static_cast<uint32_t>(cell.z()));
-  }
+  uint32_t key(const Eigen::Array3f& x) const { return key<kDoubleStepsOfKey>(x); }
+  size_t bucket(const Eigen::Array3f& x) const { return key<kDoubleStepsOfBucket>(x); }
 
  private:
+  template <int double_steps>
+  uint32_t key(const Eigen::Array3f& x) const {
+    const Eigen::Array3i cell =
+        ((x - low_) * cells_per_unit_).max(0.0f).min(kCellsPerAxis - 1).cast<int>();
+    return key_of_cell<double_steps>(static_cast<uint32_t>(cell.x()),
+                                     static_cast<uint32_t>(cell.y()),
+                                     static_cast<uint32_t>(cell.z()));
+  }
+
   Eigen::Array3f low_;
   float side_;
   float cells_per_unit_;
 };
 
-// A point's key above its index: sorting these numbers sorts by key, then by index.
+// A point's key above its place: sorting these numbers sorts by key, then by place.
 using Item = uint64_t;
-uint32_t index_of(Item item) { return static_cast<uint32_t>(item); }
+uint32_t place_of(Item item) { return static_cast<uint32_t>(item); }
 uint32_t key_of(Item item) { return static_cast<uint32_t>(item >> 32); }
 
-constexpr int64_t kGrain = 1 << 16;
-
-// Moves items to their place by one digit of the key, keeping their order within a digit. Returns
-// where each digit starts in to, and the end.
-using Boundaries = std::array<uint32_t, (1 << kBitsPerAxis) + 1>;
-
-std::unique_ptr<Boundaries> radix_pass(std::span<const Item> from, std::span<Item> to,
-                                       int key_shift) {
-  constexpr size_t kRadix = 1 << kBitsPerAxis;
-  const auto digit = [shift = 32 + key_shift](Item item) {
-    return static_cast<size_t>(item >> shift) & (kRadix - 1);
+// Stable counting sort on all threads, by chunks: bucket_of(i) < buckets, move(i, place). Returns
+// where each bucket starts, and the end.
+template <typename BucketOf, typename Move>
+std::vector<uint32_t> distribute(size_t size, size_t buckets, const BucketOf& bucket_of,
+                                 const Move& move) {
+  const auto count = static_cast<int64_t>(size);
+  std::vector<uint32_t> next(static_cast<size_t>(num_chunks(count, kGrain)) * buckets, 0);
+  const auto of_chunk = [&](int64_t begin) {
+    return next.data() + static_cast<size_t>(begin / kGrain) * buckets;
   };
-  const int64_t size = static_cast<int64_t>(from.size());
-  std::vector<std::array<uint32_t, kRadix>> starts(static_cast<size_t>(num_chunks(size, kGrain)));
-  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-    auto& count = starts[static_cast<size_t>(begin / kGrain)];
-    for (int64_t i = begin; i < end; ++i) ++count[digit(from[static_cast<size_t>(i)])];
-  });
-  auto boundaries = std::make_unique<Boundaries>();
-  uint32_t start = 0;
-  for (size_t value = 0; value < kRadix; ++value) {
-    (*boundaries)[value] = start;
-    for (auto& chunk : starts) start += std::exchange(chunk[value], start);
-  }
-  boundaries->back() = start;
-  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-    auto& next = starts[static_cast<size_t>(begin / kGrain)];
-    for (int64_t i = begin; i < end; ++i) {
-      const Item item = from[static_cast<size_t>(i)];
-      to[next[digit(item)]++] = item;
+  parallel_for(count, kGrain, [&](int64_t begin, int64_t end) {
+    uint32_t* counts = of_chunk(begin);
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      ++counts[bucket_of(i)];
     }
   });
-  return boundaries;
+  std::vector<uint32_t> starts(buckets + 1);
+  uint32_t start = 0;
+  for (size_t bucket = 0; bucket < buckets; ++bucket) {
+    starts[bucket] = start;
+    for (size_t i = bucket; i < next.size(); i += buckets) start += std::exchange(next[i], start);
+  }
+  starts.back() = start;
+  parallel_for(count, kGrain, [&](int64_t begin, int64_t end) {
+    uint32_t* places = of_chunk(begin);
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      move(i, places[bucket_of(i)]++);
+    }
+  });
+  return starts;
 }
 
-class HilbertSorter {
+// Orders some of the points; owns the memory that takes.
+class RangeSorter {
  public:
-  HilbertSorter(std::span<const Eigen::Vector3f> positions, int64_t max_run)
-      : positions_(positions), max_run_(static_cast<size_t>(max_run)) {}
+  explicit RangeSorter(int64_t max_run) : max_run_(static_cast<size_t>(max_run)) {}
 
-  // Orders the items of a range, which are in index order, along the curve through their bounding
-  // cube; then those that share a cell, recursively. scratch is as long as items.
-  void sort(std::span<Item> items, std::span<Item> scratch) const {
-    const CellGrid grid(bounds_of(items));
-    if (!grid.is_divisible()) return;
-    const bool few = items.size() < kFew;
-    const std::span<Item> keyed = few ? items : scratch;
-    parallel_for(static_cast<int64_t>(items.size()), kGrain, [&](int64_t begin, int64_t end) {
+  // The points are in index order and differ in the last `key_bits` bits of their key only.
+  void sort(std::span<IndexedPoint> points, const CellGrid& grid, int key_bits) {
+    if (points.size() < 2) return;
+    items_.resize(points.size());
+    copy_.resize(points.size());
+    parallel_for(static_cast<int64_t>(points.size()), kGrain, [&](int64_t begin, int64_t end) {
       for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-        const uint32_t index = index_of(items[i]);
-        keyed[i] = Item{grid.key(positions_[index])} << 32 | index;
+        items_[i] = Item{grid.key(array_of(points[i]))} << 32 | i;
+        copy_[i] = points[i];
       }
     });
-    if (few) {
-      std::sort(items.begin(), items.end());
-      sort_long_runs(items, scratch);
-    } else {
-      sort_buckets(items, scratch, *radix_pass(scratch, items, 2 * kBitsPerAxis));
-    }
+    sort_items(key_bits);
+    parallel_for(static_cast<int64_t>(points.size()), kGrain, [&](int64_t begin, int64_t end) {
+      for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+        points[i] = copy_[place_of(items_[i])];
+      }
+    });
+    sort_long_runs(points);
   }
 
  private:
-  static constexpr size_t kFew = 1024;
-
-  Bounds bounds_of(std::span<const Item> items) const {
-    const auto size = static_cast<int64_t>(items.size());
-    std::vector<Bounds> partial(static_cast<size_t>(num_chunks(size, kGrain)));
-    parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-      Bounds bounds;
-      for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-        const Eigen::Array3f x = positions_[index_of(items[i])].array();
-        bounds.low = bounds.low.min(x);
-        bounds.high = bounds.high.max(x);
-      }
-      partial[static_cast<size_t>(begin / kGrain)] = bounds;
-    });
-    Bounds all;
-    for (const Bounds& bounds : partial) {
-      all.low = all.low.min(bounds.low);
-      all.high = all.high.max(bounds.high);
+  void sort_items(int key_bits) {
+    constexpr int kDigitBits = 9;
+    constexpr size_t kFew = 1024;
+    if (items_.size() < kFew) {
+      std::ranges::sort(items_);
+      return;
     }
-    return all;
-  }
-
-  // The items are in 1024 buckets by the upper third of their key; most buckets fit in a cache.
-  void sort_buckets(std::span<Item> items, std::span<Item> scratch,
-                    const Boundaries& boundaries) const {
-    const auto is_large = [&](size_t b) {
-      return boundaries[b + 1] - boundaries[b] > static_cast<size_t>(4 * kGrain);
-    };
-    const auto sort_bucket = [&](size_t b) {
-      const size_t begin = boundaries[b], size = boundaries[b + 1] - begin;
-      sort_bucket_by_rest_of_key(items.subspan(begin, size), scratch.subspan(begin, size));
-    };
-    const size_t buckets = boundaries.size() - 1;
-    for (size_t b = 0; b < buckets; ++b) {
-      if (is_large(b)) sort_bucket(b);  // on all threads
-    }
-    parallel_for(static_cast<int64_t>(buckets), 1, [&](int64_t begin, int64_t) {
-      if (!is_large(static_cast<size_t>(begin))) sort_bucket(static_cast<size_t>(begin));
-    });
-  }
-
-  void sort_bucket_by_rest_of_key(std::span<Item> items, std::span<Item> scratch) const {
-    if (items.size() < kFew) {
-      std::sort(items.begin(), items.end());
-    } else {
-      radix_pass(items, scratch, 0);
-      radix_pass(scratch, items, kBitsPerAxis);
-    }
-    sort_long_runs(items, scratch);
-  }
-
-  void sort_long_runs(std::span<Item> items, std::span<Item> scratch) const {
-    for (size_t begin = 0, end = 0; begin < items.size(); begin = end) {
-      const uint32_t key = key_of(items[begin]);
-      while (end < items.size() && key_of(items[end]) == key) ++end;
-      if (end - begin <= max_run_) continue;
-      sort(items.subspan(begin, end - begin), scratch.subspan(begin, end - begin));
+    moved_.resize(items_.size());
+    for (int shift = 32; shift < 32 + key_bits; shift += kDigitBits) {
+      distribute(
+          items_.size(), size_t{1} << kDigitBits,
+          [&](size_t i) { return items_[i] >> shift & ((1u << kDigitBits) - 1); },
+          [&](size_t i, size_t place) { moved_[place] = items_[i]; });
+      items_.swap(moved_);
     }
   }
 
-  std::span<const Eigen::Vector3f> positions_;
+  // Of the points that share a cell.
+  void sort_long_runs(std::span<IndexedPoint> points) {
+    std::vector<std::span<IndexedPoint>> runs;
+    for (size_t begin = 0, end = 0; begin < points.size(); begin = end) {
+      while (end < points.size() && key_of(items_[end]) == key_of(items_[begin])) ++end;
+      if (end - begin > max_run_) runs.push_back(points.subspan(begin, end - begin));
+    }
+    for (const std::span<IndexedPoint> run : runs) {
+      const CellGrid grid(bounds_of(run));
+      if (grid.is_divisible()) sort(run, grid, 3 * kBitsPerAxis);
+    }
+  }
+
   size_t max_run_;
+  std::vector<Item> items_, moved_;
+  std::vector<IndexedPoint> copy_;
 };
 
 void check_positions(std::span<const Eigen::Vector3f> positions) {
@@ -258,22 +280,41 @@ void check_positions(std::span<const Eigen::Vector3f> positions) {
 
 uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z) {
   check(std::max({x, y, z}) < 1u << kBitsPerAxis, "hilbert_key: coordinates below 1024");
-  return key_of_cell(x, y, z);
+  return key_of_cell<kDoubleStepsOfKey>(x, y, z);
 }
 
-HilbertOrder hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run) {
+void hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run,
+                   std::span<IndexedPoint> ordered) {
   check(max_run >= 1, "hilbert_order: max_run >= 1");
+  check(ordered.size() == positions.size(), "hilbert_order: room for every point");
   check_positions(positions);
-  const auto size = static_cast<int64_t>(positions.size());
-  LargeArray<Item> items(positions.size());
-  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-    std::iota(items.begin() + begin, items.begin() + end, static_cast<Item>(begin));
-  });
-  if (size > 0) {
-    LargeArray<Item> scratch(positions.size());
-    HilbertSorter(positions, max_run).sort(items, scratch);
+  if (positions.empty()) return;
+  CellGrid grid(bounds_of_most(positions));
+  if (!grid.is_divisible()) grid = CellGrid(bounds_of(positions));
+  const bool all_in_one_place = !grid.is_divisible();
+  const std::vector<uint32_t> starts = distribute(
+      positions.size(), kBuckets,
+      [&](size_t i) { return all_in_one_place ? 0 : grid.bucket(array_of(positions[i])); },
+      [&](size_t i, size_t place) {
+        const Eigen::Vector3f& x = positions[i];
+        ordered[place] = {x.x(), x.y(), x.z(), static_cast<uint32_t>(i)};
+      });
+  if (all_in_one_place) return;
+  constexpr int kRestOfKey = 6 * (kDoubleStepsOfKey - kDoubleStepsOfBucket);
+  const auto sort_bucket = [&](size_t b, RangeSorter& sorter) {
+    sorter.sort(ordered.subspan(starts[b], starts[b + 1] - starts[b]), grid, kRestOfKey);
+  };
+  const auto is_large = [&](size_t b) { return starts[b + 1] - starts[b] > 4 * kGrain; };
+  for (size_t b = 0; b < kBuckets; ++b) {
+    if (!is_large(b)) continue;
+    RangeSorter on_all_threads(max_run);
+    sort_bucket(b, on_all_threads);
   }
-  return HilbertOrder(std::move(items));
+  std::vector<RangeSorter> sorters(static_cast<size_t>(num_threads()), RangeSorter(max_run));
+  parallel_for_workers(kBuckets, 1, [&](int64_t begin, int64_t, int worker) {
+    const auto b = static_cast<size_t>(begin);
+    if (!is_large(b)) sort_bucket(b, sorters[static_cast<size_t>(worker)]);
+  });
 }
 
 }  // namespace vggtcd

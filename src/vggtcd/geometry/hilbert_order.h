@@ -6,9 +6,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
-#include <utility>
-
-#include "vggtcd/core/large_array.h"
 
 namespace vggtcd {
 
@@ -16,25 +13,20 @@ namespace vggtcd {
 // Cells that follow one another along the curve share a face.
 uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z);
 
-// Indices of points, in an order along the curve.
-class HilbertOrder {
- public:
-  HilbertOrder() = default;
-  // The lower half of each item is an index; the upper half served to sort.
-  explicit HilbertOrder(LargeArray<uint64_t> items) : items_(std::move(items)) {}
-  size_t size() const { return items_.size(); }
-  uint32_t operator[](size_t i) const { return static_cast<uint32_t>(items_[i]); }
-
- private:
-  LargeArray<uint64_t> items_;
+// A point and its number among all points.
+struct IndexedPoint {
+  float x, y, z;
+  uint32_t index;
 };
 
-// The indices of the points along a Hilbert curve through their bounding cube. Where one of the
-// 1024^3 cells holds more than max_run points, these follow a curve of their own through their
-// bounding cube, and so on, so that one far outlier does not spoil the order of the rest. Points
-// that this does not tell apart are in ascending order of index. The same on any number of threads.
-// Positions are finite, else Error{kInternal}; at most 2^31 - 1 of them. Needs 16 bytes per point
-// while it runs.
-HilbertOrder hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run);
+// Writes the points to `ordered`, which has room for as many, along a Hilbert curve through the
+// cube around most of them; strays follow the curve at its border. Where one of the 1024^3 cells
+// holds more than max_run points, these follow a curve of their own through their bounding cube,
+// and so on, so that neither strays nor places looked at from very near spoil the order of the
+// rest. Points that this does not tell apart are in ascending order of index. The same on any
+// number of threads. Positions are finite and below 1e18, else Error{kInternal}; at most 2^31 - 1
+// of them. Needs little memory of its own, unless most of the points lie in a few of the cells.
+void hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run,
+                   std::span<IndexedPoint> ordered);
 
 }  // namespace vggtcd

@@ -60,9 +60,13 @@ Points random_points(size_t count, unsigned seed) {
 }
 
 std::vector<uint32_t> order_of(const Points& points, int64_t max_run) {
-  const HilbertOrder order = hilbert_order(points, max_run);
+  std::vector<IndexedPoint> ordered(points.size());
+  hilbert_order(points, max_run, ordered);
   std::vector<uint32_t> indices;
-  for (size_t i = 0; i < order.size(); ++i) indices.push_back(order[i]);
+  for (const IndexedPoint& p : ordered) {
+    EXPECT_EQ(points[p.index], Eigen::Vector3f(p.x, p.y, p.z));
+    indices.push_back(p.index);
+  }
   return indices;
 }
 
@@ -104,6 +108,17 @@ TEST_P(HilbertOrder, AFarOutlierDoesNotSpoilTheRest) {
   EXPECT_TRUE(is_permutation_of_indices(order, points.size()));
   std::erase(order, 200'000u);
   EXPECT_NEAR(path_length(points, order), length, 0.05 * length);
+}
+
+// More strays than the sample's percentiles cut off, and a place that holds most of the points.
+TEST_P(HilbertOrder, DenseAndSparseParts) {
+  Points points = random_points(200'000, 5);
+  for (size_t i = 0; i < 100'000; ++i) points[2 * i] *= 1e-4f;
+  for (size_t i = 0; i < 10'000; ++i) points[20 * i] = 100 * points[20 * i + 1];
+  const std::vector<uint32_t> order = order_of(points, 16);
+  EXPECT_TRUE(is_permutation_of_indices(order, points.size()));
+  // As above: 10 000 strays in a cube of side 200, 100 000 points in one of side 2, the rest small.
+  EXPECT_LT(path_length(points, order), 2 * (10'000 * 200 / 21.5 + 100'000 * 2 / 46.4));
 }
 
 TEST_P(HilbertOrder, DuplicatesStayInIndexOrder) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/error.h"
@@ -20,19 +21,29 @@ namespace {
 constexpr size_t kLanes = kNearestNeighborLanes;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+// Sixteen points as they come from hilbert_order, in the place where the block will be.
+using PointsOfBlock = std::array<IndexedPoint, kLanes>;
+static_assert(sizeof(PointsOfBlock) == sizeof(PointBlock));
+
 LargeArray<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
-  const HilbertOrder order = hilbert_order(points, kNearestNeighborLanes);
   LargeArray<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
+  if (blocks.empty()) return blocks;
+  // One array serves both: at full size the points are the largest thing in memory.
+  const std::span in_order(reinterpret_cast<IndexedPoint*>(blocks.data()), kLanes * blocks.size());
+  hilbert_order(points, kNearestNeighborLanes, in_order.first(points.size()));
+  std::ranges::fill(in_order.subspan(points.size()), in_order[points.size() - 1]);
   parallel_for(static_cast<int64_t>(blocks.size()), 1024, [&](int64_t begin, int64_t end) {
     for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {
+      PointsOfBlock of_block;
+      std::memcpy(&of_block, &blocks[b], sizeof(PointBlock));
+      PointBlock block;
       for (size_t lane = 0; lane < kLanes; ++lane) {
-        const uint32_t index = order[std::min(b * kLanes + lane, order.size() - 1)];
-        const Eigen::Vector3f& point = points[index];
-        blocks[b].x[lane] = point.x();
-        blocks[b].y[lane] = point.y();
-        blocks[b].z[lane] = point.z();
-        blocks[b].index[lane] = static_cast<int32_t>(index);
+        block.x[lane] = of_block[lane].x;
+        block.y[lane] = of_block[lane].y;
+        block.z[lane] = of_block[lane].z;
+        block.index[lane] = static_cast<int32_t>(of_block[lane].index);
       }
+      blocks[b] = block;
     }
   });
   return blocks;

@@ -32,7 +32,7 @@ class NearestNeighborIndex {
  public:
   static constexpr float kNoBound = std::numeric_limits<float>::infinity();
 
-  // Copies the targets: about 18 bytes each, 24 while building.
+  // Copies the targets: about 18 bytes each, hardly more while building.
   explicit NearestNeighborIndex(std::span<const Eigen::Vector3f> targets);
   ~NearestNeighborIndex();
   NearestNeighborIndex(NearestNeighborIndex&&) noexcept;

@@ -17,12 +17,14 @@ namespace {
 
 constexpr int32_t kNoBlock = -1;
 constexpr int kNoChild = -1;
+constexpr uint32_t kAllLanes = 0xFFFF;
+constexpr int kFewLanes = 4;  // up to as many queries are faster one at a time
 constexpr int32_t kLowestIndexNotYetKnown = INT32_MAX;
 constexpr float kLargestFloat = 3.402823466e+38f;
 
 // V offers: load(const float*), all(float), store(float*), + - *, min, max, sqrt, less(V, V) and
-// less_equal(V, V) and equal(V, V) -> V::Mask, bits(Mask) -> uint32_t,
-// max_of(V), min_of(V).
+// less_equal(V, V) and equal(V, V) -> V::Mask, bits(Mask) -> uint32_t, max_of(V), min_of(V),
+// with_lane(V, int, float), assign(Mask, int32_t, int32_t*).
 template <typename V>
 class PacketSearch {
  public:
@@ -49,7 +51,7 @@ class PacketSearch {
   // From a block that is likely near, up to the root, each time into what has not been visited: the
   // sooner the best are good, the less of the tree matters.
   void search_outward(int32_t block) {
-    visit_block(block);
+    visit_block(block, kAllLanes);
     int64_t number = block;
     for (int level = 0; level < tree_.num_levels; ++level) {
       const int visited = static_cast<int>(number % kNearestNeighborLanes);
@@ -93,13 +95,14 @@ class PacketSearch {
     return squared_length(d[0], d[1], d[2]);
   }
 
-  // Squared distances between the 16 queries and one child's box.
-  V queries_to_box(const BoxNode& node, int child) const {
+  // The queries for which one child's box is near enough to matter.
+  uint32_t lanes_near(const BoxNode& node, int child) const {
     const auto outside = [&](V q, int axis) {
       return max(max(V::all(node.low[axis][child]) - q, q - V::all(node.high[axis][child])),
                  V::all(0));
     };
-    return squared_length(outside(x_, 0), outside(y_, 1), outside(z_, 2));
+    const V distances = squared_length(outside(x_, 0), outside(y_, 1), outside(z_, 2));
+    return V::bits(less_equal(distances, best_));
   }
 
   // Visits the children of a node that matter, but for one.
@@ -121,7 +124,7 @@ class PacketSearch {
     alignas(64) float distance[kNearestNeighborLanes];
     distances.store(distance);
     const auto visit = [&](int child) {
-      if (matters(distance[child], parent.min_index[child])) {
+      if (matters(distance[child], parent.min_index[child]) && lanes_near(parent, child) != 0) {
         visit_node(level, first + child, kNoChild);
       }
     };
@@ -138,20 +141,45 @@ class PacketSearch {
     while (pending != 0) {
       const int child = __builtin_ctz(pending);
       pending &= pending - 1;
-      if (V::bits(less_equal(queries_to_box(parent, child), best_)) == 0) continue;
-      visit_block(first + child);
+      const uint32_t lanes = lanes_near(parent, child);
+      if (lanes == 0) continue;
+      visit_block(first + child, lanes);
       pending &= V::bits(less_equal(distances, V::all(worst_)));
     }
   }
 
-  // All 16 targets of a block against all 16 queries.
-  void visit_block(int32_t number) {
-    const PointBlock& block = tree_.blocks[number];
+  // Squared distances of the 16 queries to the nearest target of a block, one target at a time.
+  V nearest_to_all(const PointBlock& block) const {
     V nearest = V::all(kLargestFloat);
     for (int i = 0; i < kNearestNeighborLanes; ++i) {
       nearest = min(nearest, squared_length(V::all(block.x[i]) - x_, V::all(block.y[i]) - y_,
                                             V::all(block.z[i]) - z_));
     }
+    return nearest;
+  }
+
+  // The same for some of the queries, one query at a time; the others get the largest float.
+  V nearest_to_some(const PointBlock& block, uint32_t lanes) const {
+    V nearest = V::all(kLargestFloat);
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const int lane = __builtin_ctz(lanes);
+      nearest = V::with_lane(nearest, lane, min_of(targets_to_query(block, lane)));
+    }
+    return nearest;
+  }
+
+  // Squared distances of the 16 targets of a block to one query.
+  V targets_to_query(const PointBlock& block, int lane) const {
+    return squared_length(V::load(block.x) - V::all(queries_->x[lane]),
+                          V::load(block.y) - V::all(queries_->y[lane]),
+                          V::load(block.z) - V::all(queries_->z[lane]));
+  }
+
+  // Holds a block against the queries for which it matters.
+  void visit_block(int32_t number, uint32_t lanes) {
+    const PointBlock& block = tree_.blocks[number];
+    const V nearest = __builtin_popcount(lanes) <= kFewLanes ? nearest_to_some(block, lanes)
+                                                             : nearest_to_all(block);
     const uint32_t equally_near = want_index_ ? V::bits(equal(nearest, best_)) : 0;
     const auto nearer = less(nearest, best_);
     best_ = min(best_, nearest);
@@ -186,9 +214,7 @@ class PacketSearch {
   // The lowest index in a block at exactly this distance from one query.
   int32_t lowest_index_at(int32_t number, int lane, float squared_distance) const {
     const PointBlock& block = tree_.blocks[number];
-    const V d = squared_length(V::load(block.x) - V::all(queries_->x[lane]),
-                               V::load(block.y) - V::all(queries_->y[lane]),
-                               V::load(block.z) - V::all(queries_->z[lane]));
+    const V d = targets_to_query(block, lane);
     int32_t lowest = kLowestIndexNotYetKnown;
     for (uint32_t hits = V::bits(equal(d, V::all(squared_distance))); hits != 0; hits &= hits - 1) {
       const int32_t index = block.index[__builtin_ctz(hits)];

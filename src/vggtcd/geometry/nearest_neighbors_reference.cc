@@ -35,6 +35,10 @@ struct ArrayLanes {
       if ((where >> i & 1u) != 0) p[i] = value;
     }
   }
+  static ArrayLanes with_lane(ArrayLanes a, int lane, float value) {
+    a.v[lane] = value;
+    return a;
+  }
   void store(float* p) const {
     for (int i = 0; i < kNearestNeighborLanes; ++i) p[i] = v[i];
   }

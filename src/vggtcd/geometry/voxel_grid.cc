@@ -91,42 +91,87 @@ class VoxelTable {
   size_t used_ = 0;
 };
 
-[[noreturn]] void throw_too_fine(float coordinate, double voxel_size) {
-  throw_error(ErrorCode::kDegenerate,
-              "voxel grid: expected a voxel size above 2^-31 of the coordinates, found {} for "
-              "coordinate {}; choose a coarser grid",
-              voxel_size, coordinate);
+constexpr size_t kBatch = 256;  // points that are looked at together
+
+void check_not_too_fine(std::span<const float> coordinates, double voxel_size) {
+  int32_t largest = 0;  // of the bits of the magnitudes, which ascend like them; NaN is on top
+  for (const float x : coordinates) {
+    largest = std::max(largest, std::bit_cast<int32_t>(x) & 0x7FFFFFFF);
+  }
+  const float magnitude = std::bit_cast<float>(largest);
+  if (!(static_cast<double>(magnitude) / voxel_size < 2147483648.0)) {
+    throw_error(ErrorCode::kDegenerate,
+                "voxel grid: expected a voxel size above 2^-31 of the coordinates, found {} for "
+                "coordinate {}; choose a coarser grid",
+                voxel_size, magnitude);
+  }
 }
 
-// floor(coordinate / voxel_size); std::floor is a function call on plain x86-64.
-inline int32_t voxel_number(float coordinate, double voxel_size) {
-  const double number = static_cast<double>(coordinate) / voxel_size;
-  if (!(number < 2147483648.0 && number >= -2147483648.0)) throw_too_fine(coordinate, voxel_size);
-  const auto truncated = static_cast<int32_t>(number);
-  return truncated - (static_cast<double>(truncated) > number ? 1 : 0);
+// floor(coordinate / voxel_size) of all coordinates, written so that the compiler divides two or
+// more at a time; std::floor is a function call on plain x86-64.
+void voxel_numbers(std::span<const float> coordinates, double voxel_size, int32_t* numbers) {
+  check_not_too_fine(coordinates, voxel_size);
+  for (size_t i = 0; i < coordinates.size(); ++i) {
+    const double number = static_cast<double>(coordinates[i]) / voxel_size;
+    const auto truncated = static_cast<int32_t>(number);
+    numbers[i] = truncated - static_cast<int32_t>(static_cast<double>(truncated) > number);
+  }
 }
 
 // Enters points begin..end. Pixels next to one another often share a voxel and are entered as one.
 void enter(std::span<const Eigen::Vector3f> positions, std::span<const float> confidence,
            double voxel_size, size_t begin, size_t end, VoxelTable& table) {
-  std::array<Slot, 64> runs;
-  size_t num_runs = 0;
-  for (size_t i = begin; i < end; ++i) {
-    const Eigen::Vector3f& x = positions[i];
-    const Voxel voxel{voxel_number(x.x(), voxel_size), voxel_number(x.y(), voxel_size),
-                      voxel_number(x.z(), voxel_size)};
-    const uint64_t rank = rank_of(confidence[i], static_cast<uint32_t>(i));
-    if (num_runs > 0 && runs[num_runs - 1].voxel == voxel) {
-      runs[num_runs - 1].rank = std::max(runs[num_runs - 1].rank, rank);
-      continue;
+  std::array<int32_t, 3 * kBatch> numbers;
+  std::array<Slot, kBatch> runs;
+  for (; begin < end; begin += kBatch) {
+    const size_t count = std::min(kBatch, end - begin);
+    voxel_numbers({positions[begin].data(), 3 * count}, voxel_size, numbers.data());
+    size_t num_runs = 0;
+    for (size_t i = 0; i < count; ++i) {
+      const Voxel voxel{numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
+      const uint64_t rank = rank_of(confidence[begin + i], static_cast<uint32_t>(begin + i));
+      if (num_runs > 0 && runs[num_runs - 1].voxel == voxel) {
+        runs[num_runs - 1].rank = std::max(runs[num_runs - 1].rank, rank);
+      } else {
+        runs[num_runs++] = {voxel, rank};
+      }
     }
-    if (num_runs == runs.size()) {
-      table.raise(runs);
-      num_runs = 0;
-    }
-    runs[num_runs++] = {voxel, rank};
+    table.raise(std::span(runs).first(num_runs));
   }
-  table.raise(std::span(runs).first(num_runs));
+}
+
+// Enters what another table holds.
+void enter(const VoxelTable& other, VoxelTable& table) {
+  std::array<Slot, kBatch> entries;
+  size_t count = 0;
+  for (const Slot& slot : other.slots()) {
+    if (slot.rank == 0) continue;
+    entries[count++] = slot;
+    if (count == kBatch) table.raise(std::span(entries).first(std::exchange(count, 0)));
+  }
+  table.raise(std::span(entries).first(count));
+}
+
+// The indices of the best points, in ascending order without sorting: one bit per point, then
+// collected.
+std::vector<uint32_t> best_points(const VoxelTable& table, size_t num_points) {
+  std::vector<uint64_t> is_best((num_points + 63) / 64, 0);
+  size_t count = 0;
+  for (const Slot& slot : table.slots()) {
+    if (slot.rank == 0) continue;
+    const uint32_t index = index_of(slot.rank);
+    is_best[index / 64] |= uint64_t{1} << index % 64;
+    ++count;
+  }
+  std::vector<uint32_t> best;
+  best.reserve(count);
+  for (size_t word = 0; word < is_best.size(); ++word) {
+    for (uint64_t bits = is_best[word]; bits != 0; bits &= bits - 1) {
+      best.push_back(static_cast<uint32_t>(64 * word) +
+                     static_cast<uint32_t>(std::countr_zero(bits)));
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -142,21 +187,8 @@ std::vector<uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> position
                          enter(positions, confidence, voxel_size, static_cast<size_t>(begin),
                                static_cast<size_t>(end), tables[static_cast<size_t>(worker)]);
                        });
-  for (size_t worker = 1; worker < tables.size(); ++worker) {
-    for (const Slot& slot : tables[worker].slots()) {
-      if (slot.rank != 0) tables[0].raise({&slot, 1});
-    }
-  }
-  // In ascending order without sorting: mark, then collect.
-  std::vector<uint8_t> is_kept(positions.size(), 0);
-  for (const Slot& slot : tables[0].slots()) {
-    if (slot.rank != 0) is_kept[index_of(slot.rank)] = 1;
-  }
-  std::vector<uint32_t> kept;
-  for (size_t i = 0; i < is_kept.size(); ++i) {
-    if (is_kept[i] != 0) kept.push_back(static_cast<uint32_t>(i));
-  }
-  return kept;
+  for (size_t worker = 1; worker < tables.size(); ++worker) enter(tables[worker], tables[0]);
+  return best_points(tables[0], positions.size());
 }
 
 }  // namespace vggtcd

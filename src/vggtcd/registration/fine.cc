@@ -93,8 +93,9 @@ FineResult refine_translation(const DownsampledCloud& t1, const DownsampledCloud
   result.translation_update_u = refined.translation - coarse_t2_from_t1.translation;
 
   // 4. Residual self-check over all points, not just the static ones.
-  const NearestNeighbors fine = index_t2.query(map_points(refined, t1.positions));
-  const double median_fine = median(fine.distance);
+  std::vector<float> fine_distance(t1.positions.size());
+  index_t2.query(map_points(refined, t1.positions), NearestNeighborIndex::kNoBound, fine_distance);
+  const double median_fine = median(fine_distance);
   result.median_residual_fine_u = median_fine;
   const bool improved = median_fine < result.median_residual_coarse_u;
   if (improved) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Confidence is only ever ranked: the one threshold of the method is its median.
+// Confidence is only ever ranked: thresholds are its median or another percentile.
 #include "vggtcd/scene/confidence.h"
 
 #include <algorithm>
@@ -15,16 +15,21 @@ namespace vggtcd {
 
 namespace {
 
-// The confidences of the pixels that have depth; copied only if some pixel has none.
+// The confidences of the pixels that have depth; copied only if some pixel has none. At least one.
 class ConfidencesWithDepth {
  public:
   explicit ConfidencesWithDepth(const Reconstruction& r) : values_(r.confidence) {
-    if (std::ranges::all_of(r.depth, [](float depth) { return depth > 0; })) return;
-    copy_.reserve(r.num_pixels());
-    for (size_t i = 0; i < r.num_pixels(); ++i) {
-      if (r.depth[i] > 0) copy_.push_back(r.confidence[i]);
+    if (!std::ranges::all_of(r.depth, [](float depth) { return depth > 0; })) {
+      copy_.reserve(r.num_pixels());
+      for (size_t i = 0; i < r.num_pixels(); ++i) {
+        if (r.depth[i] > 0) copy_.push_back(r.confidence[i]);
+      }
+      values_ = copy_;
     }
-    values_ = copy_;
+    if (values_.empty()) {
+      throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
+                  r.num_frames());
+    }
   }
   std::span<const float> values() const { return values_; }
 
@@ -38,14 +43,16 @@ class ConfidencesWithDepth {
 float confidence_threshold(const Reconstruction& reconstruction) {
   const ConfidencesWithDepth with_depth(reconstruction);
   const std::span<const float> values = with_depth.values();
-  if (values.empty()) {
-    throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
-                reconstruction.num_frames());
-  }
   const float threshold = median(values);
   // Normally found among the first few.
   if (std::ranges::any_of(values, [&](float value) { return value > threshold; })) return threshold;
   return std::nextafter(threshold, -std::numeric_limits<float>::infinity());
+}
+
+float confidence_percentile(const Reconstruction& reconstruction, double percent) {
+  const double percents[] = {percent};
+  return static_cast<float>(
+      percentiles(ConfidencesWithDepth(reconstruction).values(), percents)[0]);
 }
 
 }  // namespace vggtcd

@@ -39,5 +39,12 @@ TEST(ConfidenceThreshold, RefusesAnEpochWithoutDepth) {
   EXPECT_THROW(confidence_threshold(with({0, 0}, {1, 2})), Error);
 }
 
+TEST(ConfidencePercentile, IsThatOfThePixelsWithDepth) {
+  EXPECT_EQ(confidence_percentile(with({1, 1, 1, 0}, {5, 1, 3, 100}), 50), 3.0f);
+  EXPECT_EQ(confidence_percentile(with({1, 1, 1, 0}, {5, 1, 3, 100}), 25), 2.0f);
+  EXPECT_EQ(confidence_percentile(with({1, 1, 1, 1}, {5, 1, 3, 4}), 100), 5.0f);
+  EXPECT_THROW(confidence_percentile(with({0, 0}, {1, 2}), 50), Error);
+}
+
 }  // namespace
 }  // namespace vggtcd

@@ -4,8 +4,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
-#include <vector>
 
+#include "vggtcd/core/large_array.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
 
@@ -13,9 +13,9 @@ namespace vggtcd {
 
 // All arrays have one entry per point. Positions are in the reconstruction's frame and units.
 struct PointCloud {
-  std::vector<Eigen::Vector3f> positions;
-  std::vector<float> confidence;
-  std::vector<uint32_t> pixels;  // index into the reconstruction's [S, H, W]
+  LargeArray<Eigen::Vector3f> positions;
+  LargeArray<float> confidence;
+  LargeArray<uint32_t> pixels;  // index into the reconstruction's [S, H, W]
 
   size_t size() const { return positions.size(); }
 };
@@ -48,5 +48,10 @@ inline bool is_confident(const Reconstruction& reconstruction, size_t pixel, flo
 // The points of all pixels with depth > 0 and confidence > min_confidence, in pixel order.
 PointCloud unproject(const Reconstruction& reconstruction, float min_confidence,
                      const Sim3& out_from_world = {});
+
+// Their positions alone: half of the memory.
+LargeArray<Eigen::Vector3f> unproject_positions(const Reconstruction& reconstruction,
+                                                float min_confidence,
+                                                const Sim3& out_from_world = {});
 
 }  // namespace vggtcd
