@@ -1,18 +1,23 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Photos on the command line: what is refused, with which sentence, and that an interrupted job continues.
+"""Photos on the command line: what is refused, and with which sentence; what is planned.
 
-Usage: photos_test.py PROGRAM [unittest arguments]
+Usage: photos_test.py PROGRAM TEST_MEDIA [unittest arguments]
 """
+import fcntl
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 
+import numpy as np
+
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
+TEST_MEDIA = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
 def run(*arguments, **kwargs):
@@ -85,17 +90,102 @@ class BadInput(unittest.TestCase):
         (self.root / "broken.mp4").write_bytes(b"nothing")
         self.assertIn("broken.mp4", self.refusal(status=3, after="broken.mp4"))
 
-    def test_photos_on_one_side_and_predictions_on_the_other(self):
-        self.assertIn("both sides", self.refusal(status=3, after="after.npz"))
+    def test_two_places_or_no_overlap_of_the_epochs(self):
+        if not shutil.which("colmap"):
+            self.skipTest("no COLMAP")
+        for scene in ("kitchen", "courtyard"):
+            done = run("synthesize", self.root / scene, "--scene", scene, "--frames", "6", "--width", "168", "--no-wat")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        line = self.refusal("--frame-side", "168", status=5, before="kitchen/before", after="courtyard/after")
+        self.assertIn("are these two sets of the same place, with overlapping views?", line)
+
+    def prediction(self, name, **arrays):
+        poses = np.tile(np.eye(4)[:3], (3, 1, 1))
+        intrinsic = np.tile(np.array([[80.0, 0, 48], [0, 80, 32], [0, 0, 1]]), (3, 1, 1))
+        depth = np.ones((3, 64, 96), "f4")
+        np.savez(self.root / name, extrinsic=poses, intrinsic=intrinsic, depth=depth, depth_conf=depth, **arrays)
+
+    def test_a_prediction_without_images_on_one_side(self):
+        self.prediction("after.npz")
+        self.assertIn("expected images in the prediction file", self.refusal(status=3, after="after.npz"))
+
+    def test_a_prediction_of_nothing_that_the_photos_show(self):
+        if not shutil.which("colmap"):
+            self.skipTest("no COLMAP")
+        noise = np.random.default_rng(1).integers(0, 256, (3, 64, 96, 3), "u1")
+        self.prediction("after.npz", images=noise)
+        self.assertIn("no two of the 6 photos", self.refusal(status=5, after="after.npz"))
+
+    def test_a_photo_that_is_none_is_named(self):
+        (self.root / "after" / "3.jpg").write_text("<html>404</html>")
+        self.assertIn("3.jpg: not a readable photo: found a web page", self.refusal(status=3))
+
+    def test_a_second_run_into_the_same_directory_waits_its_turn(self):
+        stages = self.root / "out" / ".stages"
+        stages.mkdir(parents=True)
+        (self.root / "out" / ".vggt-cd-results").write_text("")
+        with open(stages / "lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            self.assertIn("another vggt-cd is working there", self.refusal(status=6))
 
     def test_joint_is_for_predictions(self):
         self.assertIn("leave the option out", self.refusal("--joint", "x.npz", status=2))
 
-    def test_dry_run_writes_nothing(self):
-        done = run("detect", self.root / "before", self.root / "after", "-o", self.root / "out", "--dry-run")
+    def test_odd_sizes(self):
+        self.assertIn("multiple of 14", self.refusal("--frame-side", "150", status=2))
+
+
+class DryRun(unittest.TestCase):
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.root = pathlib.Path(self.temporary.name)
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def plan(self, before, after, *arguments):
+        done = run("detect", before, after, "-o", self.root / "out", "--dry-run", *arguments)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("3 before, 3 after", done.stdout)
         self.assertFalse((self.root / "out").exists())
+        seconds = re.search(r"Time: about (\d+) (s|min)", done.stdout)
+        return done.stdout, int(seconds[1]) * (60 if seconds[2] == "min" else 1)
+
+    def test_says_frames_sizes_memory_and_time_that_grow_with_the_photos(self):
+        for i in range(24):
+            write_photo(self.root / "all" / f"{i}.ppm", i + 1)
+        after = self.root / "all"
+        for i in range(3):
+            write_photo(self.root / "before" / f"{i}.ppm", 100 + i)
+        text, few = self.plan(self.root / "before", after, "--frames", "3")
+        self.assertIn("3 before, 3 after, 6 in the joint", text)
+        self.assertIn("518 x 350 px", text)
+        self.assertRegex(text, r"Memory: about \d+\.\d GB \(\d+\.\d GB available\)")
+        text, many = self.plan(self.root / "before", after)
+        self.assertIn("3 before, 24 after, 8 in the joint", text)
+        self.assertGreater(many, 3 * few)
+
+    def test_a_video_beside_a_folder(self):
+        for i in range(12):
+            write_photo(self.root / "frames" / f"{i:02}.ppm", i + 1)
+        video = self.root / "walk.avi"
+        made = subprocess.run([TEST_MEDIA, "video", video, *sorted((self.root / "frames").iterdir())])
+        if made.returncode == 77:
+            self.skipTest("OpenCV cannot write videos here")
+        self.assertEqual(made.returncode, 0)
+        text, _ = self.plan(video, self.root / "frames", "--frames", "5")
+        self.assertIn("5 before, 5 after", text)
+
+    def test_heic_beside_ppm(self):
+        for i in range(2):
+            write_photo(self.root / "before" / f"{i}.ppm", i + 1)
+            write_photo(self.root / "other" / f"{i}.ppm", i + 11)
+            made = subprocess.run([TEST_MEDIA, "heic", self.root / f"{i}.heic", self.root / "other" / f"{i}.ppm"])
+            if made.returncode == 77:
+                self.skipTest("libheif or its encoder is not here")
+            self.assertEqual(made.returncode, 0)
+        text, _ = self.plan(self.root / "*.heic", self.root / "before")  # the first photo gives the size
+        self.assertIn("2 before, 2 after", text)
+        self.assertIn("518 x 350 px", text)
 
 
 if __name__ == "__main__":

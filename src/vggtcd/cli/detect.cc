@@ -30,6 +30,7 @@ void add_detect(Program& program) {
   const auto run = [arguments](ProgressSink& progress) {
     const EpochArguments& epochs = arguments->epochs;
     EpochInputs inputs;
+    ReconstructedPhotos photos;
     if (names_photos(epochs.before) || names_photos(epochs.after)) {
       arguments->options.validate();
       arguments->photos.before = epochs.before;
@@ -39,8 +40,7 @@ void add_detect(Program& program) {
         fmt::print("{}", describe_plan(arguments->photos, progress));
         return;
       }
-      const ReconstructedPhotos photos =
-          reconstruct_photos(arguments->photos, epochs.out, progress);
+      photos = reconstruct_photos(arguments->photos, epochs.out, progress);
       fmt::print("{}\n", photos.explanation);
       inputs = photos.inputs;
     } else {
@@ -95,12 +95,13 @@ void add_detect(Program& program) {
       "Examples:\n"
       "  vggt-cd detect before/ after/ -o out\n"
       "  vggt-cd detect before.mp4 'after/*.jpg' --frames 30 -o out\n"
+      "  vggt-cd detect t1.npz after/ -o out\n"
       "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n\n"
-      "Photos: each side a folder, a pattern or a video. Without network weights they are "
-      "reconstructed "
-      "by COLMAP and\nplane-sweep depth, a fallback that refuses what it cannot place. "
-      "Reconstructions "
-      "are kept in OUT/.stages and used\nagain for the same photos and options.\n\n"
+      "Photos: each side a folder, a pattern or a video; or one side a prediction file that holds "
+      "its images. Without network\nweights they are reconstructed by COLMAP and plane-sweep "
+      "depth, a fallback that refuses what it cannot place. Finished\nstages are kept in "
+      "OUT/.stages: a job that was interrupted goes on, one that is repeated starts at the "
+      "alignment.\n\n"
       "Reads the .npz files that VGGT, VGGT-Omega, MapAnything and Depth Anything 3 save. Writes "
       "before_aligned.ply and after.ply\n(scalar fields change_distance, changed, confidence), "
       "overlays/, change.npz, sim3.json, summary.json, cameras_*.tum and\na COLMAP model; "

@@ -5,8 +5,11 @@
 namespace vggtcd::cli {
 
 void EpochArguments::add_to(CLI::App* command) {
-  command->add_option("BEFORE", before, "Predictions of the before epoch, T1 (.npz).")->required();
-  command->add_option("AFTER", after, "Predictions of the after epoch, T2 (.npz).")->required();
+  command
+      ->add_option("BEFORE", before,
+                   "The before epoch, T1: predictions (.npz); for detect also photos.")
+      ->required();
+  command->add_option("AFTER", after, "The after epoch, T2.")->required();
   command->add_option("-o,--out", out, "Directory for the results; it appears when complete.")
       ->required();
   command
@@ -26,7 +29,7 @@ void EpochArguments::require_none() const {
   if (joint.empty() && initial_sim3.empty() && !aligned) return;
   throw_error(
       ErrorCode::kUsage,
-      "--joint, --initial-sim3 and --aligned are for prediction files, found photos ({}, {}); "
+      "--joint, --initial-sim3 and --aligned are for two prediction files, found photos ({}, {}); "
       "leave the option out",
       before, after);
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// vggt-cd evaluate: trajectory errors of a registration against known poses.
+// vggt-cd evaluate: cameras against known poses, results of detect against the truth.
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "vggtcd/cli/command.h"
-#include "vggtcd/evaluation/trajectory_metrics.h"
+#include "vggtcd/evaluation/results_scores.h"
 #include "vggtcd/io/json_file.h"
-#include "vggtcd/io/npz.h"
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/io/trajectory.h"
 
@@ -15,7 +14,7 @@ namespace vggtcd::cli {
 namespace {
 
 struct Arguments {
-  std::string before, after, truth, truth_before, truth_after, sim3, out;
+  std::string before, after, change, truth, truth_before, truth_after, sim3, out;
   std::string poses = "camera_from_world";
 };
 
@@ -32,19 +31,6 @@ std::vector<Rigid3> poses_of(const Trajectory& trajectory) {
 
 std::vector<Rigid3> read_poses(const std::string& path, const std::string& convention) {
   return poses_of(read_trajectory(path, convention_of(convention)));
-}
-
-// extrinsic_t1 or extrinsic_t2 of truth.npz.
-std::vector<Rigid3> read_truth_npz(const NpzReader& reader, const std::string& key) {
-  const int64_t shape[] = {-1, 3, 4};
-  reader.expect_shape(key, shape);
-  const std::vector<double> values = reader.read<double>(key);
-  std::vector<Rigid3> poses(values.size() / 12);
-  for (size_t k = 0; k < poses.size(); ++k) {
-    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(&values[12 * k]);
-    poses[k] = {matrix.leftCols<3>(), matrix.col(3)};
-  }
-  return poses;
 }
 
 // A COLMAP model of both epochs: images named SEQUENCE/FILE; the first folder is T1 (or the one
@@ -76,10 +62,7 @@ BitemporalTrajectory split_by_folder(const Trajectory& all, const std::string& p
 
 BitemporalTrajectory read_truth(const Arguments& arguments) {
   if (!arguments.truth.empty()) {
-    if (arguments.truth.ends_with(".npz")) {
-      const NpzReader reader(arguments.truth);
-      return {read_truth_npz(reader, "extrinsic_t1"), read_truth_npz(reader, "extrinsic_t2")};
-    }
+    if (arguments.truth.ends_with(".npz")) return read_true_cameras(arguments.truth);
     return split_by_folder(read_trajectory(arguments.truth, convention_of(arguments.poses)),
                            arguments.truth);
   }
@@ -91,7 +74,57 @@ BitemporalTrajectory read_truth(const Arguments& arguments) {
           read_poses(arguments.truth_after, arguments.poses)};
 }
 
+Json change_json(const ChangeScores& scores) {
+  return {{"pixels", scores.pixels},
+          {"changed_pixels", scores.changed_pixels},
+          {"precision", scores.precision},
+          {"recall", scores.recall},
+          {"f1", scores.f1},
+          {"auprc", scores.auprc}};
+}
+
+// Results of detect on a generated scene.
+void run_change(const Arguments& arguments) {
+  if (!arguments.before.empty() || !arguments.truth.ends_with(".npz")) {
+    throw_error(ErrorCode::kUsage,
+                "--change: expected a directory of results and --truth truth.npz of a generated "
+                "scene, and nothing else");
+  }
+  const ResultsScores s = score_results(arguments.change, arguments.truth);
+  fmt::print(
+      "photos placed             {:>5} of {} before, {} of {} after\n"
+      "ATE mean                  {:>12.6g} m\n"
+      "pixels with evidence      {:>11.1f} %\n"
+      "                          {:>12} {:>12}\n"
+      "precision                 {:>12.3f} {:>12.3f}\n"
+      "recall                    {:>12.3f} {:>12.3f}\n"
+      "F1                        {:>12.3f} {:>12.3f}\n"
+      "AUPRC                     {:>12.3f} {:>12.3f}\n"
+      "never-seen called changed {:>11.1f} %\n",
+      s.frames_t1, s.true_frames_t1, s.frames_t2, s.true_frames_t2, s.cameras.ate_mean,
+      100 * s.evidence_share, "evidence", "every pixel", s.evidence.precision,
+      s.every_pixel.precision, s.evidence.recall, s.every_pixel.recall, s.evidence.f1,
+      s.every_pixel.f1, s.evidence.auprc, s.every_pixel.auprc, 100 * s.unseen_called_changed);
+  if (arguments.out.empty()) return;
+  write_json_file(arguments.out, Json{{"frames_t1", s.frames_t1},
+                                      {"frames_t2", s.frames_t2},
+                                      {"true_frames_t1", s.true_frames_t1},
+                                      {"true_frames_t2", s.true_frames_t2},
+                                      {"ate_mean", s.cameras.ate_mean},
+                                      {"ate_relative", s.cameras.ate_relative},
+                                      {"rre_mean_deg", s.cameras.rre_mean_deg},
+                                      {"evidence_share", s.evidence_share},
+                                      {"unseen_called_changed", s.unseen_called_changed},
+                                      {"evidence", change_json(s.evidence)},
+                                      {"every_pixel", change_json(s.every_pixel)}});
+}
+
 void run(const Arguments& arguments) {
+  if (!arguments.change.empty()) return run_change(arguments);
+  if (arguments.before.empty() || arguments.after.empty()) {
+    throw_error(ErrorCode::kUsage,
+                "expected the cameras BEFORE and AFTER, or --change with results of detect");
+  }
   const Sim3 t2_from_t1 = arguments.sim3.empty() ? Sim3{} : read_sim3(arguments.sim3);
   const std::vector<Rigid3> before = read_poses(arguments.before, arguments.poses);
   const std::vector<Rigid3> after = read_poses(arguments.after, arguments.poses);
@@ -125,15 +158,15 @@ void run(const Arguments& arguments) {
 
 void add_evaluate(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = add_command(
-      program, program.app, "evaluate",
-      "Trajectory errors of a registration: ATE, RTE and RRE of the cameras of both epochs against "
-      "known poses.",
-      [arguments](ProgressSink&) { run(*arguments); });
-  command->add_option("BEFORE", arguments->before, "predicted cameras of the before epoch")
-      ->required();
-  command->add_option("AFTER", arguments->after, "predicted cameras of the after epoch")
-      ->required();
+  CLI::App* command = add_command(program, program.app, "evaluate",
+                                  "Cameras of both epochs against known poses (ATE, RTE, RRE), or "
+                                  "all of detect's results against "
+                                  "the truth of a generated scene.",
+                                  [arguments](ProgressSink&) { run(*arguments); });
+  command->add_option("BEFORE", arguments->before, "predicted cameras of the before epoch");
+  command->add_option("AFTER", arguments->after, "predicted cameras of the after epoch");
+  command->add_option("--change", arguments->change,
+                      "results of detect on a generated scene, from its photos or its predictions");
   command->add_option("--sim3", arguments->sim3,
                       "sim3.json that maps BEFORE into AFTER's frame; without it they share one");
   command->add_option(
@@ -154,7 +187,8 @@ void add_evaluate(Program& program) {
       "maps both to the truth; ATE in the truth's unit. RTE and RRE compare neighbouring frames of "
       "an\n"
       "epoch, with that scale. Definitions: docs/benchmark.md.\n\n"
-      "  vggt-cd evaluate OUT/cameras_before.tum OUT/cameras_after.tum --truth truth.npz");
+      "  vggt-cd evaluate OUT/cameras_before.tum OUT/cameras_after.tum --truth truth.npz\n"
+      "  vggt-cd evaluate --change OUT --truth truth.npz");
 }
 
 }  // namespace vggtcd::cli

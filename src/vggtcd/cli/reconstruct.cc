@@ -7,7 +7,7 @@
 #include "vggtcd/cli/command.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/output_file.h"
-#include "vggtcd/io/photo_list.h"
+#include "vggtcd/io/photo_source.h"
 #include "vggtcd/vggt/batch_file.h"
 #include "vggtcd/vggt/checkpoint.h"
 #include "vggtcd/vggt/memory_plan.h"
@@ -29,7 +29,12 @@ struct Arguments {
 ImageBatch load_input(const Arguments& arguments, ProgressSink& progress) {
   const bool npz = arguments.photos.size() == 1 && arguments.photos[0].extension() == ".npz";
   if (npz) return read_image_batch(arguments.photos[0]);
-  return load_photos(list_photos(arguments.photos, progress), arguments.preprocess, progress);
+  std::vector<PhotoRef> photos;
+  for (const fs::path& source : arguments.photos) {
+    const std::vector<PhotoRef> found = find_photos(source, {}, progress);
+    photos.insert(photos.end(), found.begin(), found.end());
+  }
+  return load_photos(photos, arguments.preprocess, progress);
 }
 
 void reconstruct(const Arguments& arguments, ProgressSink& progress) {
@@ -71,7 +76,8 @@ void add_reconstruct(Program& program) {
                   [arguments](ProgressSink& progress) { reconstruct(*arguments, progress); });
   command
       ->add_option("PHOTOS", arguments->photos,
-                   "Folders and photos, in order; or one .npz with images (S,3,H,W) in [0,1].")
+                   "Folders, patterns, photos and videos, in order; or one .npz with images "
+                   "(S,3,H,W) in [0,1].")
       ->required();
   command->add_option("-o,--output", arguments->output, "The prediction file to write (.npz).")
       ->required();

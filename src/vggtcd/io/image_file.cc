@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/heif_image.h"
 #include "vggtcd/io/mapped_file.h"
 
 namespace vggtcd {
@@ -67,7 +68,7 @@ std::string_view why_not_an_image(std::string_view file) {
   if (file.empty()) return "the file is empty";
   const std::string_view start = file.substr(0, 64);
   if (start.substr(std::min<size_t>(4, start.size())).starts_with("ftyp")) {
-    return "HEIC, AVIF or a video, which cannot be decoded; save it as JPEG or PNG";
+    return "a video, or a picture in a container that is not known; save it as JPEG or PNG";
   }
   const size_t text = start.find_first_not_of(" \t\r\n");
   if (text != std::string_view::npos && start[text] == '<') return "found a web page or SVG";
@@ -107,6 +108,17 @@ Image rgb_from_bgr(const cv::Mat& bgr) {
   return image;
 }
 
+// The high bytes; OpenCV's own reduction to 8 bits takes them for PNG, but rounds for TIFF.
+cv::Mat high_bytes(const cv::Mat& picture) {
+  cv::Mat bytes(picture.size(), CV_MAKETYPE(CV_8U, picture.channels()));
+  for (int y = 0; y < picture.rows; ++y) {
+    const uint16_t* from = picture.ptr<uint16_t>(y);
+    std::transform(from, from + picture.cols * picture.channels(), bytes.ptr<uint8_t>(y),
+                   [](uint16_t value) { return static_cast<uint8_t>(value >> 8); });
+  }
+  return bytes;
+}
+
 Image rgb_on_white(const cv::Mat& bgra) {
   Image image(bgra.cols, bgra.rows);
   const bool wide = bgra.depth() == CV_16U;
@@ -117,10 +129,7 @@ Image rgb_on_white(const cv::Mat& bgra) {
     uint8_t* to = image.pixel(0, y);
     for (int x = 0; x < bgra.cols; ++x) {
       const int alpha = channel(y, x, 3);
-      for (int c = 2; c >= 0; --c) {
-        const int blended = channel(y, x, c) * alpha + 255 * (255 - alpha);
-        *to++ = static_cast<uint8_t>((2 * blended + 255) / 510);
-      }
+      for (int c = 2; c >= 0; --c) *to++ = on_white(channel(y, x, c), alpha);
     }
   }
   return image;
@@ -136,6 +145,7 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
   };
   if (file.empty()) fail(why_not_an_image(file));
   if (file.size() > size_t{std::numeric_limits<int>::max()}) fail("larger than 2 GB");
+  if (is_heif(bytes)) return decode_heif(bytes, name);
   const bool jpeg = file.starts_with(kJpegStart);
   const bool png = file.starts_with(kPngStart);
   if ((jpeg && !is_complete_jpeg(file)) || (png && !is_complete_png(file))) {
@@ -146,6 +156,7 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
     const bool rgba =
         picture.channels() == 4 && (picture.depth() == CV_8U || picture.depth() == CV_16U);
     if (rgba) return rgb_on_white(picture);
+    if (picture.type() == CV_16UC3) return rgb_from_bgr(high_bytes(picture));
   }
   int flags = cv::IMREAD_COLOR;
   if (!options.apply_exif_orientation) flags |= cv::IMREAD_IGNORE_ORIENTATION;

@@ -139,10 +139,32 @@ TEST(ImageFile, OtherFormatsAreDecodedToo) {
       bgr.at<cv::Vec3b>(y, x) = {rgb[2], rgb[1], rgb[0]};
     }
   }
-  for (const char* extension : {".bmp", ".tiff", ".ppm"}) {
+  for (const char* extension : {".bmp", ".tiff", ".ppm", ".webp"}) {
+    std::vector<uint8_t> file;
+    // A quality above 100 asks OpenCV's WebP for no loss.
+    ASSERT_TRUE(cv::imencode(extension, bgr, file, {cv::IMWRITE_WEBP_QUALITY, 101}));
+    EXPECT_EQ(decode_image(std::as_bytes(std::span(file)), "x").rgb, image.rgb) << extension;
+  }
+}
+
+TEST(ImageFile, SixteenBitColoursKeepTheirHighByte) {
+  cv::Mat bgr(2, 256, CV_16UC3);
+  for (int x = 0; x < 256; ++x) {
+    const auto level = [](int value) { return static_cast<uint16_t>(value); };
+    bgr.at<cv::Vec3w>(0, x) = {level(256 * x), level(256 * x + 255), level(65535 - 256 * x)};
+    bgr.at<cv::Vec3w>(1, x) = {level(128), level(257 * x), level(256 * x + 127)};
+  }
+  for (const char* extension : {".png", ".tiff"}) {
     std::vector<uint8_t> file;
     ASSERT_TRUE(cv::imencode(extension, bgr, file));
-    EXPECT_EQ(decode_image(std::as_bytes(std::span(file)), "x").rgb, image.rgb) << extension;
+    const Image image = decode_image(std::as_bytes(std::span(file)), "x");
+    for (int x = 0; x < 256; ++x) {
+      for (int y = 0; y < 2; ++y) {
+        for (int c = 0; c < 3; ++c) {
+          EXPECT_EQ(image.pixel(x, y)[c], bgr.at<cv::Vec3w>(y, x)[2 - c] >> 8) << extension << x;
+        }
+      }
+    }
   }
 }
 
@@ -162,7 +184,7 @@ TEST(ImageFile, WhatIsNoPhotoIsCalledWhatItIs) {
   EXPECT_THAT(error_of(""), HasSubstr("empty"));
   EXPECT_THAT(error_of("<html>404</html>"), HasSubstr("web page"));
   EXPECT_THAT(error_of("hello"), HasSubstr("not an image"));
-  EXPECT_THAT(error_of(std::string("\0\0\0\x18", 4) + "ftypheic"), HasSubstr("HEIC"));
+  EXPECT_THAT(error_of(std::string("\0\0\0\x18", 4) + "ftypisom"), HasSubstr("video"));
   EXPECT_THAT(error_of(std::string(1000, '\0')), HasSubstr("not an image"));
 }
 

@@ -9,10 +9,10 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 #include "vggtcd/core/error.h"
-#include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
 namespace {
@@ -48,10 +48,34 @@ void check_replaceable(const fs::path& target) {
   }
 }
 
+// Removes OUT.partial-PID of processes that are gone; what they had taken out of OUT goes back.
+void remove_stale(const fs::path& target, const std::vector<std::string>& kept) {
+  const std::string prefix = target.filename().string() + ".partial-";
+  std::vector<fs::path> stale;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(target.parent_path(), error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(prefix) && entry.is_directory()) stale.push_back(entry.path());
+  }
+  for (const fs::path& path : stale) {
+    const auto lock =
+        FileLock::try_lock(path / OutputDirectory::kMarker, FileLock::IfMissing::kGiveUp);
+    if (!lock) continue;  // not ours, or its process lives
+    for (const std::string& name : kept) {
+      const bool taken =
+          fs::exists(path / name) && fs::exists(target) && !fs::exists(target / name);
+      if (taken) fs::rename(path / name, target / name, error);
+    }
+    fs::remove_all(path, error);
+  }
+}
+
 }  // namespace
 
-OutputDirectory::OutputDirectory(const fs::path& target) : target_(resolve(target)) {
+OutputDirectory::OutputDirectory(const fs::path& target, std::vector<std::string> kept)
+    : target_(resolve(target)), kept_(std::move(kept)) {
   check_replaceable(target_);
+  remove_stale(target_, kept_);
   aside_ = target_;
   aside_ += fmt::format(".partial-{}", getpid());
   for (fs::path parent = target_.parent_path(); !fs::exists(parent);
@@ -59,11 +83,15 @@ OutputDirectory::OutputDirectory(const fs::path& target) : target_(resolve(targe
     first_created_parent_ = parent;
   }
   std::error_code error;
-  fs::remove_all(aside_, error);  // of a killed process that had our number
+  fs::remove_all(aside_, error);  // without a marker, of a process that had our number
   fs::create_directories(aside_, error);
   try {
     if (error) fail(target_, error.message());
-    write_text_file(aside_ / kMarker, "Written by vggt-cd, which may replace this directory.\n");
+    // Locked before it says anything: nobody takes this directory for a dead process's.
+    lock_ = FileLock::try_lock(aside_ / kMarker);
+    std::ofstream marker(aside_ / kMarker);
+    marker << "Written by vggt-cd, which may replace this directory.\n";
+    if (!lock_ || !marker.flush()) fail(target_, std::strerror(errno));
   } catch (...) {
     // A constructor that throws has no destructor.
     fs::remove_all(first_created_parent_.empty() ? aside_ : first_created_parent_, error);

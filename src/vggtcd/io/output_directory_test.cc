@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 
@@ -88,6 +90,56 @@ TEST(OutputDirectory, RefusesFilesThatAppearedMeanwhile) {
   }
   EXPECT_EQ(file_bytes(directory / "out/a.jpg"), "precious");
   EXPECT_EQ(directory.num_files(), 1u);
+}
+
+// The directory that a process killed at that moment leaves: no destructor runs in it.
+void leave_behind(const std::filesystem::path& target) {
+  const pid_t child = fork();
+  if (child == 0) {
+    static OutputDirectory out(target, {"kept"});
+    write_text_file(out / "a.txt", "half");
+    if (std::filesystem::exists(target / "kept")) {  // as in the middle of commit()
+      std::filesystem::rename(target / "kept", out / "kept");
+    }
+    raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+}
+
+TEST(OutputDirectory, RemovesWhatAKilledProcessLeft) {
+  const TemporaryDirectory directory;
+  leave_behind(directory / "out");
+  ASSERT_EQ(directory.num_files(), 1u);
+  write_results(directory / "out", "one");
+  EXPECT_EQ(directory.num_files(), 1u);
+  EXPECT_EQ(file_bytes(directory / "out/a.txt"), "one");
+}
+
+TEST(OutputDirectory, GivesBackWhatAKilledProcessHadTaken) {
+  const TemporaryDirectory directory;
+  write_results(directory / "out", "one");
+  write_text_file(directory / "out/kept", "expensive");
+  leave_behind(directory / "out");
+  ASSERT_FALSE(std::filesystem::exists(directory / "out/kept"));
+  OutputDirectory out(directory / "out", {"kept"});
+  EXPECT_EQ(file_bytes(directory / "out/kept"), "expensive");
+  out.commit();
+  EXPECT_EQ(file_bytes(directory / "out/kept"), "expensive");
+  EXPECT_EQ(directory.num_files(), 1u);
+}
+
+TEST(OutputDirectory, LeavesAloneWhatALivingProcessWritesOrOthersOwn) {
+  const TemporaryDirectory directory;
+  std::filesystem::create_directory(directory / "out.partial-mine");
+  write_bytes(directory / "out.partial-mine/a.jpg", "precious");
+  OutputDirectory living(directory / "out");
+  // As another process would look at it: under a name that is not this process's own.
+  std::filesystem::rename(living.path(), directory / "out.partial-0");
+  { const OutputDirectory other(directory / "out"); }
+  EXPECT_TRUE(std::filesystem::exists(directory / "out.partial-0"));
+  EXPECT_EQ(file_bytes(directory / "out.partial-mine/a.jpg"), "precious");
 }
 
 TEST(OutputDirectory, AnUnwritablePlaceIsAnOutputError) {

@@ -19,9 +19,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::set<std::string> kPictures = {".jpg", ".jpeg", ".png", ".webp", ".tif",  ".tiff",
-                                         ".bmp", ".ppm",  ".pgm", ".jp2",  ".heic", ".heif"};
+const std::set<std::string> kPictures = {".jpg", ".jpeg", ".jpe",  ".png",  ".webp",
+                                         ".tif", ".tiff", ".bmp",  ".dib",  ".ppm",
+                                         ".pgm", ".jp2",  ".heic", ".heif", ".avif"};
 const std::set<std::string> kVideos = {".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg"};
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 std::string ending_of(const fs::path& path) {
   std::string ending = path.extension().string();
@@ -33,23 +36,35 @@ bool is_pattern(const std::string& source) {
   return source.find_first_of("*?[") != std::string::npos && !fs::exists(source);
 }
 
-std::vector<fs::path> files_matching(const fs::path& folder, const std::string& pattern) {
-  std::error_code failed;
+struct Listing {
   std::vector<fs::path> files;
+  size_t others = 0;  // of a folder: visible files that are not pictures
+  std::string an_other;
+};
+
+// An empty pattern: the pictures.
+Listing files_matching(const fs::path& folder, const std::string& pattern) {
+  std::error_code failed;
+  Listing found;
   for (const auto& entry : fs::directory_iterator(folder, failed)) {
     const std::string name = entry.path().filename().string();
     if (name.front() == '.' || !entry.is_regular_file()) continue;
     const bool wanted = pattern.empty() ? kPictures.count(ending_of(entry.path())) > 0
                                         : fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
-    if (wanted) files.push_back(entry.path());
+    if (wanted) {
+      found.files.push_back(entry.path());
+    } else if (pattern.empty()) {
+      ++found.others;
+      found.an_other = name;
+    }
   }
   if (failed) {
     throw_error(ErrorCode::kInput, "{}: cannot be listed ({})", folder.string(), failed.message());
   }
-  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+  std::sort(found.files.begin(), found.files.end(), [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());
   });
-  return files;
+  return found;
 }
 
 void leave_out_duplicates(std::vector<PhotoRef>& photos, ProgressSink& progress) {
@@ -64,7 +79,7 @@ void leave_out_duplicates(std::vector<PhotoRef>& photos, ProgressSink& progress)
   });
 }
 
-std::vector<fs::path> list_files(const std::string& source) {
+Listing list_files(const std::string& source) {
   const fs::path path(source);
   if (fs::is_directory(path)) return files_matching(path, "");
   if (is_pattern(source)) {
@@ -74,31 +89,36 @@ std::vector<fs::path> list_files(const std::string& source) {
   if (!fs::exists(path)) {
     throw_error(ErrorCode::kInput, "{}: no such file or folder", source);
   }
-  return {path};
+  return {{path}, 0, ""};
+}
+
+// Removes a run of digits from the front and returns it without leading zeros.
+std::string_view take_number(std::string_view& text) {
+  size_t size = 0;
+  while (size < text.size() && is_digit(text[size])) ++size;
+  std::string_view number = text.substr(0, size);
+  text.remove_prefix(size);
+  number.remove_prefix(std::min(number.find_first_not_of('0'), number.size()));
+  return number;
 }
 
 }  // namespace
 
-bool natural_less(const std::string& a, const std::string& b) {
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!digit(a[i]) || !digit(b[j])) {
-      if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
-      ++i, ++j;
-      continue;
+bool natural_less(std::string_view a, std::string_view b) {
+  const std::string_view whole_a = a, whole_b = b;
+  while (!a.empty() && !b.empty()) {
+    if (is_digit(a[0]) && is_digit(b[0])) {
+      const std::string_view number_a = take_number(a), number_b = take_number(b);
+      if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+      if (number_a != number_b) return number_a < number_b;
+    } else {
+      if (a[0] != b[0]) return static_cast<unsigned char>(a[0]) < static_cast<unsigned char>(b[0]);
+      a.remove_prefix(1);
+      b.remove_prefix(1);
     }
-    while (i < a.size() && a[i] == '0') ++i;
-    while (j < b.size() && b[j] == '0') ++j;
-    const size_t from_i = i, from_j = j;
-    while (i < a.size() && digit(a[i])) ++i;
-    while (j < b.size() && digit(b[j])) ++j;
-    if (i - from_i != j - from_j) return i - from_i < j - from_j;
-    const int order = a.compare(from_i, i - from_i, b, from_j, j - from_j);
-    if (order != 0) return order < 0;
   }
-  if (i < a.size() || j < b.size()) return j < b.size();
-  return a < b;  // equal but for leading zeros
+  if (a.empty() != b.empty()) return a.empty();
+  return whole_a < whole_b;  // differ in leading zeros only
 }
 
 std::vector<int> evenly_spaced(int total, int count) {
@@ -144,15 +164,7 @@ uint64_t content_hash(const PhotoRef& photo) {
 bool names_photos(const std::string& source) { return ending_of(source) != ".npz"; }
 
 Image load_photo(const PhotoRef& photo, const ImageReadOptions& options) {
-  if (photo.decoded) return *photo.decoded;
-  const std::string ending = ending_of(photo.path);
-  if (ending == ".heic" || ending == ".heif") {
-    throw_error(ErrorCode::kInput,
-                "{}: HEIC photos are not read; convert them to JPEG first (heif-convert from "
-                "Debian's libheif-examples)",
-                photo.path.string());
-  }
-  return read_image(photo.path, options);
+  return photo.decoded ? *photo.decoded : read_image(photo.path, options);
 }
 
 std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOptions& options,
@@ -164,13 +176,18 @@ std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOp
     leave_out_duplicates(photos, progress);
     return photos;
   }
+  const Listing found = list_files(source);
   std::vector<PhotoRef> photos;
-  for (const fs::path& file : list_files(source)) {
+  for (const fs::path& file : found.files) {
     photos.push_back({file, file.filename().string(), nullptr});
   }
   if (photos.empty()) {
-    throw_error(ErrorCode::kInput, "{}: expected photos (jpg, png, webp, tiff ...), found none",
-                source);
+    throw_error(ErrorCode::kInput, "{}: expected photos (jpg, png, heic, webp, tiff ...), found {}",
+                source, found.others == 0 ? "none" : fmt::format("{} other files", found.others));
+  }
+  if (found.others > 0) {
+    progress.notice(fmt::format("{}: {} files are not photos, such as {}", source, found.others,
+                                found.an_other));
   }
   leave_out_duplicates(photos, progress);
   if (options.max_frames > 0 && static_cast<int>(photos.size()) > options.max_frames) {

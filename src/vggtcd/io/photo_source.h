@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The photos of one epoch from what a user names: a folder, a glob pattern, files, or a video.
+// The photos that a user names: by a folder, a glob pattern, a file, or a video.
 #pragma once
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "vggtcd/core/progress.h"
@@ -15,7 +16,7 @@ namespace vggtcd {
 // A photo that is read when it is needed; a frame of a video is there already.
 struct PhotoRef {
   std::filesystem::path path;
-  std::string name;                      // file name, or video name and frame number
+  std::string name;                      // file name; of a frame "walk_000012.mp4"
   std::shared_ptr<const Image> decoded;  // frames of a video only
 };
 
@@ -24,14 +25,16 @@ struct PhotoSourceOptions {
   ImageReadOptions read;
 };
 
-// Numbers in names compare as numbers: photo_2 before photo_10; otherwise byte by byte.
-bool natural_less(const std::string& a, const std::string& b);
+// Whether a comes before b: runs of digits compare as numbers (photo_2 before photo_10, of any
+// length), the rest byte by byte.
+bool natural_less(std::string_view a, std::string_view b);
 
 // The photos named by `source`, in natural order of their names. A folder contributes the files
-// with the ending of a picture; a pattern with * or ? the matching files of one folder; a video its
-// frames: the sharpest (largest variance of the Laplacian) of each of max_frames equal stretches.
-// Photos with the bytes of an earlier one are left out with a notice. Throws Error{kInput} naming
-// the source if there is nothing, or what is there cannot be read.
+// with the ending of a picture, not those of folders below; others are counted in a notice. A
+// pattern with * or ? stands for the matching files of one folder, a file for itself, whatever its
+// ending; a video for its frames: the sharpest (largest variance of the Laplacian) of each of
+// max_frames equal stretches. Photos with the bytes of an earlier one are left out with a notice.
+// Throws Error{kInput} naming the source if there is nothing, or what is there cannot be read.
 std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOptions& options,
                                   ProgressSink& progress);
 

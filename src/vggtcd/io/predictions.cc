@@ -45,6 +45,13 @@ void read_frame_size(const NpzReader& npz, PredictionLayout& layout) {
   layout.width = shape[2];
 }
 
+std::string images_key(const NpzReader& npz) {
+  for (const char* key : {"images", "image"}) {
+    if (npz.has(key)) return key;
+  }
+  return "";
+}
+
 PredictionLayout find_layout(const NpzReader& npz) {
   PredictionLayout layout;
   if (npz.has("extrinsic")) {
@@ -72,9 +79,7 @@ PredictionLayout find_layout(const NpzReader& npz) {
   for (const char* key : {"depth_conf", "conf"}) {
     if (layout.confidence.empty() && npz.has(key)) layout.confidence = key;
   }
-  for (const char* key : {"images", "image"}) {
-    if (layout.images.empty() && npz.has(key)) layout.images = key;
-  }
+  layout.images = images_key(npz);
   for (const char* key : {"world_points_from_depth", "world_points"}) {
     if (layout.world_points.empty() && npz.has(key)) layout.world_points = key;
   }
@@ -326,6 +331,10 @@ std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key, in
 Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
                                    const PredictionLimits& limits) {
   return read_arrays(NpzReader(path), progress, limits.min_frames);
+}
+
+bool prediction_has_images(const std::filesystem::path& path) {
+  return !images_key(NpzReader(path)).empty();
 }
 
 JointReconstruction read_joint(const std::filesystem::path& path, const Reconstruction& before,

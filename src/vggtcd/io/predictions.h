@@ -22,6 +22,10 @@ struct PredictionLimits {
 Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
                                    const PredictionLimits& limits = {});
 
+// Whether the file holds the photos, images or image; without them colours are grey. Throws
+// Error{kInput} if it cannot be read.
+bool prediction_has_images(const std::filesystem::path& path);
+
 // Reads the joint pass over keyframes of `before` and `after`: the same, with keyframes_t1 and
 // keyframes_t2. Throws Error{kInput} unless these are distinct frame numbers of the two epochs, one
 // for each frame, and all three passes have one frame size.

@@ -63,11 +63,12 @@ std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSi
     chosen.push_back(static_cast<int>(std::max_element(begin, end) - sharp.begin()));
   }
   std::vector<PhotoRef> photos;
-  const std::string name = std::filesystem::path(path).filename().string();
+  const std::filesystem::path file(path);
   for_each_frame(path, [&](int number, const cv::Mat& frame) {
     if (!std::binary_search(chosen.begin(), chosen.end(), number)) return;
-    photos.push_back({path, fmt::format("{}_{:06d}", name, number),
-                      std::make_shared<const Image>(image_of(frame))});
+    photos.push_back(
+        {path, fmt::format("{}_{:06d}{}", file.stem().string(), number, file.extension().string()),
+         std::make_shared<const Image>(image_of(frame))});
   });
   return photos;
 }

@@ -101,8 +101,7 @@ void DetectOptions::validate() const {
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress) {
   options.validate();
-  OutputDirectory directory(out);
-  directory.keep(".stages");  // photo_stages.h
+  OutputDirectory directory(out, {kStages});
   StageLog log(progress);
   DetectOutcome outcome;
 

@@ -13,6 +13,9 @@
 
 namespace vggtcd {
 
+// What detect() keeps in OUT for the next run: the stages of photo_stages.h.
+inline constexpr const char* kStages = ".stages";
+
 // Which files, and how the epochs are first brought together: exactly one of the last three.
 struct EpochInputs {
   std::filesystem::path before;  // prediction files, docs/formats.md

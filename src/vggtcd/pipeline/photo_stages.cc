@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/core/version.h"
 #include "vggtcd/io/json_file.h"
@@ -17,57 +18,108 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void require_two(const std::vector<PhotoRef>& photos, const std::string& source) {
-  if (photos.size() >= 2) return;
-  throw_error(ErrorCode::kInput,
-              "{}: expected at least 2 different photos of the place, better 10 or more, found {}",
-              source, photos.size());
+EpochPhotos photos_of(const std::string& source, int frames, ProgressSink& progress) {
+  EpochPhotos epoch;
+  epoch.photos = find_photos(source, {.max_frames = frames, .read = {}}, progress);
+  if (epoch.photos.size() < 2) {
+    throw_error(
+        ErrorCode::kInput,
+        "{}: expected at least 2 different photos of the place, better 10 or more, found {}",
+        source, epoch.photos.size());
+  }
+  return epoch;
+}
+
+// A prediction, and its images as photos of that epoch.
+EpochPhotos prediction_of(const std::string& source, ProgressSink& progress) {
+  if (!prediction_has_images(source)) {
+    throw_error(ErrorCode::kInput,
+                "{}: expected images in the prediction file, for they tell where it belongs among "
+                "the photos of the other side; found none: save it with its images, or predict the "
+                "other side as well and give --joint, --initial-sim3 or --aligned",
+                source);
+  }
+  EpochPhotos epoch;
+  const auto given = std::make_shared<const Reconstruction>(read_reconstruction(source, progress));
+  for (int frame = 0; frame < given->num_frames(); ++frame) {
+    auto image = std::make_shared<Image>(given->width, given->height);
+    const auto color = given->frame_color(frame);
+    std::copy(color.begin(), color.end(), image->rgb.begin());
+    epoch.photos.push_back({source, given->views[static_cast<size_t>(frame)].name, image});
+  }
+  epoch.given = given;
+  return epoch;
+}
+
+uint64_t fnv1a(const std::string& text) {
+  uint64_t hash = 0xcbf29ce484222325u;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return hash;
 }
 
 std::string stage_key(const PhotoEpochs& photos, const Reconstructor& reconstructor) {
   std::string all = fmt::format("{} {}\n", kVersion, reconstructor.fingerprint());
   for (const auto* epoch : {&photos.before, &photos.after}) {
-    for (const PhotoRef& photo : *epoch) {
+    for (const PhotoRef& photo : epoch->photos) {
       all += fmt::format("{} {:016x}\n", photo.name, content_hash(photo));
+    }
+    if (epoch->given) {  // cameras take part in it as well
+      const std::filesystem::path& file = epoch->photos.front().path;
+      all += fmt::format("given {:016x}\n", content_hash({file, "", nullptr}));
     }
     all += "--\n";
   }
-  uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a
-  for (const char c : all) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return fmt::format("{}-{:016x}", reconstructor.name(), hash);
+  return fmt::format("{}-{:016x}", reconstructor.name(), fnv1a(all));
 }
 
 // OUT holds nothing but what we may replace, so that .stages may live in it from now on.
 void claim(const fs::path& out) {
-  { const OutputDirectory check(out); }
-  fs::create_directories(out);
-  write_text_file(out / OutputDirectory::kMarker,
-                  "Written by vggt-cd, which may replace this directory.\n");
+  { const OutputDirectory check(out, {kStages}); }
+  fs::create_directories(out / kStages);
+  const fs::path marker = out / OutputDirectory::kMarker;
+  if (!fs::exists(marker)) {
+    write_text_file(marker, "Written by vggt-cd, which may replace this directory.\n");
+  }
+}
+
+std::shared_ptr<const FileLock> lock_stages(const fs::path& out) {
+  auto lock = FileLock::try_lock(out / kStages / "lock");
+  if (!lock) {
+    throw_error(ErrorCode::kOutput,
+                "{}: another vggt-cd is working there; wait for it, or name another directory",
+                out.string());
+  }
+  return std::make_shared<const FileLock>(std::move(*lock));
+}
+
+// Files that a killed run had not finished.
+void remove_partial_files(const fs::path& folder) {
+  std::vector<fs::path> partial;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.is_regular_file() && name.find(".npz.partial-") != std::string::npos) {
+      partial.push_back(entry.path());
+    }
+  }
+  for (const fs::path& path : partial) fs::remove(path);
 }
 
 }  // namespace
 
 PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress) {
-  for (const std::string& source : {inputs.before, inputs.after}) {
-    if (names_photos(source)) continue;
-    throw_error(ErrorCode::kInput,
-                "{}: expected photos as on the other side, found a prediction file; give photos on "
-                "both sides, or prediction files on both with --joint, --initial-sim3 or --aligned",
-                source);
-  }
-  PhotoSourceOptions options;
-  options.max_frames = inputs.frames;
+  const auto epoch = [&](const std::string& source) {
+    return names_photos(source) ? photos_of(source, inputs.frames, progress)
+                                : prediction_of(source, progress);
+  };
   PhotoEpochs photos;
-  photos.before = find_photos(inputs.before, options, progress);
-  photos.after = find_photos(inputs.after, options, progress);
-  require_two(photos.before, inputs.before);
-  require_two(photos.after, inputs.after);
+  photos.before = epoch(inputs.before);
+  photos.after = epoch(inputs.after);
   std::set<uint64_t> before;
-  for (const PhotoRef& photo : photos.before) before.insert(content_hash(photo));
+  for (const PhotoRef& photo : photos.before.photos) before.insert(content_hash(photo));
   const auto repeated = static_cast<size_t>(
-      std::count_if(photos.after.begin(), photos.after.end(),
+      std::count_if(photos.after.photos.begin(), photos.after.photos.end(),
                     [&](const PhotoRef& photo) { return before.count(content_hash(photo)) > 0; }));
-  if (repeated == photos.after.size()) {
+  if (repeated == photos.after.photos.size()) {
     throw_error(ErrorCode::kInput,
                 "{} and {} hold the same {} photos; expected photos of two times", inputs.before,
                 inputs.after, repeated);
@@ -83,13 +135,18 @@ std::string describe_plan(const PhotoInputs& inputs, ProgressSink& progress) {
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   const ReconstructionPlan plan = reconstructor->plan(photos);
+  const std::string time = plan.seconds < 90 ? fmt::format("{:.0f} s", plan.seconds)
+                                             : fmt::format("{:.0f} min", plan.seconds / 60);
   return fmt::format(
-      "Reconstructor: {}\nPhotos: {} before, {} after, {} in the joint reconstruction\nFrames: {} "
-      "x {} "
-      "px\nMemory: about {:.1f} GB ({:.1f} GB available)\nTime: about {:.0f} min on two cores\n",
+      "Reconstructor: {}\n"
+      "Photos: {} before, {} after, {} in the joint reconstruction\n"
+      "Frames: {} x {} px\n"
+      "Memory: about {:.1f} GB ({:.1f} GB available)\n"
+      "Time: about {} with {} threads, and half as long again for alignment, change and results; "
+      "other machines differ by a factor of two or three\n",
       plan.note, plan.frames_before, plan.frames_after, plan.frames_joint, plan.width, plan.height,
       static_cast<double>(plan.memory_bytes) * 1e-9,
-      static_cast<double>(available_memory_bytes()) * 1e-9, std::max(1.0, plan.seconds / 60));
+      static_cast<double>(available_memory_bytes()) * 1e-9, time, num_threads());
 }
 
 ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path& out,
@@ -97,29 +154,27 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   claim(out);
-  const fs::path stages = out / ".stages";
-  const fs::path kept = stages / stage_key(photos, *reconstructor);
-  if (fs::exists(kept / "reconstruction.json")) {
+  ReconstructedPhotos done;
+  done.lock = lock_stages(out);
+  const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
+  const fs::path complete = kept / "reconstruction.json";
+  if (fs::exists(complete)) {
     progress.notice(
         fmt::format("reconstruction of an earlier run is used again ({})", kept.string()));
   } else {
     fs::create_directories(kept);
-    const EpochReconstructions result = reconstructor->reconstruct(photos, kept / "work", progress);
-    write_reconstruction(kept / "before.npz", result.before);
-    write_reconstruction(kept / "after.npz", result.after);
-    write_joint(kept / "joint.npz", result.joint);
+    remove_partial_files(kept);
+    const std::string explanation = reconstructor->reconstruct(photos, kept, progress);
     // Written last: the stage is complete when it is there.
-    write_json_file(kept / "reconstruction.json", Json{{"reconstructor", reconstructor->name()},
-                                                       {"explanation", result.explanation}});
+    write_json_file(complete,
+                    Json{{"reconstructor", reconstructor->name()}, {"explanation", explanation}});
   }
   fs::remove_all(kept / "work");
-  ReconstructedPhotos done;
-  done.inputs.before = kept / "before.npz";
-  done.inputs.after = kept / "after.npz";
-  done.inputs.joint = kept / "joint.npz";
-  done.explanation = json_member(read_json_file(kept / "reconstruction.json"), "explanation",
-                                 (kept / "reconstruction.json").string())
-                         .get<std::string>();
+  done.inputs.before = photos.before.given ? fs::path(inputs.before) : kept / kBeforeFile;
+  done.inputs.after = photos.after.given ? fs::path(inputs.after) : kept / kAfterFile;
+  done.inputs.joint = kept / kJointFile;
+  done.explanation =
+      json_member(read_json_file(complete), "explanation", complete.string()).get<std::string>();
   done.inputs.origin = done.explanation;
   done.inputs.has_holes = reconstructor->leaves_holes();
   return done;

@@ -5,31 +5,36 @@
 
 #include <filesystem>
 
+#include "vggtcd/io/file_lock.h"
 #include "vggtcd/pipeline/detect.h"
 #include "vggtcd/reconstruction/choose_reconstructor.h"
 
 namespace vggtcd {
 
 struct PhotoInputs {
-  std::string before, after;  // a folder, a pattern or a video each
-  int frames = 0;             // per epoch at most; 0: all photos, 40 of a video
+  // A folder, a pattern or a video; or on one side a prediction file (.npz) with its images.
+  std::string before, after;
+  int frames = 0;  // per epoch at most; 0: all photos, 40 of a video
   ReconstructorOptions reconstruction;
 };
 
-// The photos of both epochs. Throws Error{kInput} for fewer than two photos on a side and for two
-// sides with the same photos.
+// The photos of both epochs; of a prediction file its images, and itself. Throws Error{kInput} for
+// fewer than two photos on a side, for two sides with the same photos, and for a prediction file
+// without images.
 PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress);
 
 // The plan, in words, for --dry-run.
 std::string describe_plan(const PhotoInputs& inputs, ProgressSink& progress);
 
 struct ReconstructedPhotos {
-  EpochInputs inputs;       // before.npz, after.npz and joint.npz in OUT/.stages/KEY
+  EpochInputs inputs;       // before.npz, after.npz and joint.npz in OUT/.stages/KEY, or as given
   std::string explanation;  // how they were made
+  std::shared_ptr<const FileLock> lock;  // while it lives, no other process works on OUT/.stages
 };
 
 // Reconstructs unless OUT/.stages has the result for these photos and options already; KEY is a
-// hash of the photos' bytes, their names and all that the reconstruction depends on.
+// hash of the photos' bytes, their names and all that the reconstruction depends on. What an
+// interrupted run has finished there is used. Throws Error{kOutput} while another process is at it.
 ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const std::filesystem::path& out,
                                        ProgressSink& progress);
 

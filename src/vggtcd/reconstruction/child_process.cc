@@ -64,7 +64,7 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 }  // namespace
 
 int run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
-                const std::string& remedy) {
+                const std::string& remedy, const std::function<void()>& while_running) {
   throw_if_interrupted();
   const std::string file = find_in_path(arguments.at(0));
   if (file.empty()) {
@@ -83,8 +83,9 @@ int run_program(const std::vector<std::string>& arguments, const std::filesystem
   close(log_file);
   if (child < 0) throw_error(ErrorCode::kMemory, "{}: cannot be started", arguments[0]);
 
+  constexpr int kPollsPerCall = 50;
   int status = 0;
-  while (true) {
+  for (int poll = 1;; ++poll) {
     const pid_t ended = waitpid(child, &status, WNOHANG);
     if (ended == child || (ended < 0 && errno != EINTR)) break;
     if (interrupt_requested()) {
@@ -92,6 +93,7 @@ int run_program(const std::vector<std::string>& arguments, const std::filesystem
       waitpid(child, &status, 0);
       throw_if_interrupted();
     }
+    if (while_running && poll % kPollsPerCall == 0) while_running();
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

@@ -31,6 +31,8 @@ std::span<const EnumName<ReconstructorKind>> enum_names(ReconstructorKind) {
 
 void ReconstructorOptions::validate() const {
   check_field(keyframes >= 1, "keyframes", keyframes, "at least 1");
+  check_field(frame_side >= 56 && frame_side <= 1036 && frame_side % 14 == 0, "frame_side",
+              frame_side, "a multiple of 14 from 56 to 1036");
 }
 
 std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,
@@ -48,6 +50,7 @@ std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& 
   if (kind == ReconstructorKind::kClassical) {
     ClassicalOptions classical;
     classical.keyframes = options.keyframes;
+    classical.frame_side_px = options.frame_side;
     return std::make_unique<ClassicalReconstructor>(classical);
   }
   if (weights.empty()) {
@@ -61,6 +64,7 @@ std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& 
   VggtReconstructorOptions vggt;
   vggt.weights = weights;
   vggt.keyframes = options.keyframes;
+  vggt.frame_side_px = options.frame_side;
   vggt.network.precision = options.precision;
   return std::make_unique<VggtReconstructor>(vggt);
 }

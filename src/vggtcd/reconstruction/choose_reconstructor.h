@@ -14,6 +14,7 @@ struct ReconstructorOptions {
   ReconstructorKind reconstructor = ReconstructorKind::kAuto;
   std::string weights;
   int keyframes = 5;
+  int frame_side = 518;
   Precision precision = Precision::kAuto;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
@@ -24,6 +25,9 @@ struct ReconstructorOptions {
           "VGGT's weights, model.safetensors or model.pt. Without it the file named by "
           "VGGTCD_WEIGHTS, then ~/.local/share/vggt-cd/model.safetensors.");
     field("keyframes", self.keyframes, "Photos per epoch in the joint reconstruction; at least 1.");
+    field("frame_side", self.frame_side,
+          "Longer side of a frame, px, a multiple of 14; 518 is what the network was trained with. "
+          "Smaller is faster and coarser. A prediction file on one side decides it.");
     field("precision", self.precision,
           "Of the network: auto takes bf16 where the processor has it.");
   };

@@ -19,9 +19,10 @@ struct ClassicalOptions {
 };
 
 // Both epochs come out in COLMAP's common frame, so the joint reconstruction repeats their
-// keyframes and the coarse stage of registration finds the identity. Photos that COLMAP cannot
-// place are left out with a notice. Pixels without agreeing neighbours have no depth: unknown, not
-// changed.
+// keyframes and the coarse stage of registration finds the identity. An epoch that is given takes
+// part by its images: the joint reconstruction then holds the classical depth of its keyframes,
+// which the coarse stage fits it to. Photos that COLMAP cannot place, and those without depth, are
+// left out with a notice. Pixels without agreeing neighbours have no depth: unknown, not changed.
 class ClassicalReconstructor : public Reconstructor {
  public:
   explicit ClassicalReconstructor(const ClassicalOptions& options) : options_(options) {}
@@ -29,8 +30,8 @@ class ClassicalReconstructor : public Reconstructor {
   bool leaves_holes() const override { return true; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
-  EpochReconstructions reconstruct(const PhotoEpochs& photos, const std::filesystem::path& scratch,
-                                   ProgressSink& progress) const override;
+  std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
+                          ProgressSink& progress) const override;
 
  private:
   ClassicalOptions options_;

@@ -63,15 +63,16 @@ class ByteReader {
 };
 
 std::map<uint32_t, RadialCamera> read_cameras(const std::filesystem::path& path) {
-  constexpr int kSimpleRadial = 2;
+  constexpr int kSimplePinhole = 0, kSimpleRadial = 2;
   ByteReader in(path);
   std::map<uint32_t, RadialCamera> cameras;
-  for (uint64_t left = in.take_count(56); left > 0; --left) {
+  for (uint64_t left = in.take_count(48); left > 0; --left) {
     const auto id = in.take<uint32_t>();
     const auto model = in.take<int32_t>();
-    if (model != kSimpleRadial) {
-      throw_error(ErrorCode::kInput, "{}: expected camera model {} (SIMPLE_RADIAL), found {}",
-                  in.name(), kSimpleRadial, model);
+    if (model != kSimplePinhole && model != kSimpleRadial) {
+      throw_error(ErrorCode::kInput,
+                  "{}: expected camera model {} (SIMPLE_PINHOLE) or {} (SIMPLE_RADIAL), found {}",
+                  in.name(), kSimplePinhole, kSimpleRadial, model);
     }
     RadialCamera camera;
     camera.width = static_cast<int>(in.take<uint64_t>());
@@ -79,7 +80,7 @@ std::map<uint32_t, RadialCamera> read_cameras(const std::filesystem::path& path)
     camera.focal_px = in.take<double>();
     camera.cx = in.take<double>() - 0.5;  // COLMAP's pixel centres are at half integers
     camera.cy = in.take<double>() - 0.5;
-    camera.k = in.take<double>();
+    if (model == kSimpleRadial) camera.k = in.take<double>();
     cameras[id] = camera;
   }
   return cameras;

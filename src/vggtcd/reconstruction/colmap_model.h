@@ -12,8 +12,9 @@
 
 namespace vggtcd {
 
-// One focal length and one coefficient of radial distortion (COLMAP's SIMPLE_RADIAL): a point x, y
-// of the plane z = 1 is seen at f (1 + k r^2) x + cx, and the same for y.
+// One focal length and one coefficient of radial distortion (COLMAP's SIMPLE_RADIAL, or with k = 0
+// its SIMPLE_PINHOLE): a point x, y of the plane z = 1 is seen at f (1 + k r^2) x + cx, and the
+// same for y.
 struct RadialCamera {
   int width = 0, height = 0;
   double focal_px = 0;

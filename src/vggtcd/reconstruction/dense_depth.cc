@@ -142,8 +142,7 @@ void remove_small_patches(int width, int height, int min_patch_px, DepthMap& map
 
 std::vector<DepthMap> dense_depth(const std::vector<GrayView>& views,
                                   const std::vector<DepthTask>& tasks,
-                                  const DenseDepthOptions& options, ProgressSink& progress) {
-  ProgressStage stage(progress, "depth");
+                                  const DenseDepthOptions& options, ProgressStage& stage) {
   std::vector<DepthMap> swept(views.size());
   const auto count = static_cast<int64_t>(views.size());
   const int64_t slab = num_threads();

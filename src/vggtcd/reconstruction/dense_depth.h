@@ -47,6 +47,6 @@ void remove_small_patches(int width, int height, int min_patch_px, DepthMap& map
 // All three, for all views; a view without sources has no depth.
 std::vector<DepthMap> dense_depth(const std::vector<GrayView>& views,
                                   const std::vector<DepthTask>& tasks,
-                                  const DenseDepthOptions& options, ProgressSink& progress);
+                                  const DenseDepthOptions& options, ProgressStage& stage);
 
 }  // namespace vggtcd

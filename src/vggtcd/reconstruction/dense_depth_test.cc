@@ -145,7 +145,8 @@ TEST(DenseDepth, RecoversAWavyWallWithTheSameBitsForAnyThreads) {
   std::vector<std::vector<DepthMap>> runs;
   for (const int threads : {1, 4}) {
     set_num_threads(threads);
-    runs.push_back(dense_depth(scene.views, tasks, test_options(), silent_progress()));
+    ProgressStage stage(silent_progress(), "depth");
+    runs.push_back(dense_depth(scene.views, tasks, test_options(), stage));
   }
   set_num_threads(2);
   for (size_t i = 0; i < 5; ++i) {
@@ -215,7 +216,8 @@ TEST(DenseDepth, GivesNoDepthToAViewWithoutSources) {
   const Scene scene = make_scene(3);
   auto tasks = all_others(3);
   tasks[0].sources.clear();
-  const auto maps = dense_depth(scene.views, tasks, test_options(), silent_progress());
+  ProgressStage stage(silent_progress(), "depth");
+  const auto maps = dense_depth(scene.views, tasks, test_options(), stage);
   EXPECT_THAT(maps[0].depth, ::testing::Each(0.0f));
 }
 

@@ -16,9 +16,20 @@
 
 namespace vggtcd {
 
+// One epoch of a job: photos, or a prediction that is there already and holds its photos.
+struct EpochPhotos {
+  std::vector<PhotoRef> photos;
+  std::shared_ptr<const Reconstruction> given;  // frame k is photo k; null: to be made
+};
+
 struct PhotoEpochs {
-  std::vector<PhotoRef> before, after;
+  EpochPhotos before, after;
   ImageReadOptions read;
+
+  // The prediction that decides the size of all frames, if there is one.
+  const Reconstruction* given() const {
+    return before.given ? before.given.get() : after.given.get();
+  }
 };
 
 // What reconstruct() would do, for --dry-run.
@@ -26,15 +37,14 @@ struct ReconstructionPlan {
   int frames_before = 0, frames_after = 0, frames_joint = 0;
   int width = 0, height = 0;  // of a frame
   int64_t memory_bytes = 0;   // estimated peak
-  double seconds = 0;         // estimated, on two cores of 2024
-  std::string note;           // a sentence on what the estimate stands on
+  double seconds = 0;         // estimated
+  std::string note;           // what will be done, and what the estimate of time stands on
 };
 
-struct EpochReconstructions {
-  Reconstruction before, after;
-  JointReconstruction joint;
-  std::string explanation;  // one sentence: what was done and how far it can be trusted
-};
+// What reconstruct() leaves in its folder, prediction files (docs/formats.md).
+inline constexpr const char* kBeforeFile = "before.npz";
+inline constexpr const char* kAfterFile = "after.npz";
+inline constexpr const char* kJointFile = "joint.npz";
 
 class Reconstructor {
  public:
@@ -44,12 +54,34 @@ class Reconstructor {
   virtual bool leaves_holes() const = 0;
   virtual std::string fingerprint() const = 0;  // all that its result depends on besides the photos
   virtual ReconstructionPlan plan(const PhotoEpochs& photos) const = 0;
-  // `scratch` is a folder of its own for working files. Same photos and fingerprint, same result.
-  // Throws Error{kDegenerate} with the reason when the photos do not carry a reconstruction that
-  // can be trusted.
-  virtual EpochReconstructions reconstruct(const PhotoEpochs& photos,
-                                           const std::filesystem::path& scratch,
-                                           ProgressSink& progress) const = 0;
+  // Writes before.npz and after.npz, of the epochs that are not given, and joint.npz into `folder`,
+  // each when it is complete; what an earlier call with the same photos and fingerprint left there
+  // is used. Files and folders of other names there are its own. Same photos and fingerprint, same
+  // bytes, whether interrupted or not. Returns one sentence: what was done and how far it can be
+  // trusted. Throws Error{kDegenerate} with the reason when the photos do not carry a
+  // reconstruction that can be trusted.
+  virtual std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
+                                  ProgressSink& progress) const = 0;
+};
+
+// Puts a prefix before the names of stages: "before: depth".
+class PrefixedProgress : public ProgressSink {
+ public:
+  PrefixedProgress(ProgressSink& sink, std::string prefix)
+      : sink_(sink), prefix_(std::move(prefix)) {}
+  void stage_started(std::string_view stage) override { sink_.stage_started(named(stage)); }
+  void stage_advanced(std::string_view stage, double fraction) override {
+    sink_.stage_advanced(named(stage), fraction);
+  }
+  void stage_finished(std::string_view stage, double seconds) override {
+    sink_.stage_finished(named(stage), seconds);
+  }
+  void notice(std::string_view message) override { sink_.notice(message); }
+
+ private:
+  std::string named(std::string_view stage) const { return prefix_ + std::string(stage); }
+  ProgressSink& sink_;
+  std::string prefix_;
 };
 
 // The joint reconstruction of epochs that are in one frame already: copies of their keyframes.

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vggtcd/reconstruction/child_process.h"
+#include "vggtcd/reconstruction/match_file.h"
 
 namespace vggtcd {
 namespace {
@@ -20,12 +21,12 @@ constexpr const char* kRemedy =
     "install COLMAP (Debian: apt-get install colmap), or give network weights with --weights";
 
 // Names by which COLMAP sorts as we do; one folder for each camera.
-std::vector<std::string> colmap_names(const std::vector<Image>& images, int num_before) {
+std::vector<std::string> colmap_names(const SfmPhotos& photos) {
   std::vector<std::string> names;
-  for (size_t i = 0; i < images.size(); ++i) {
-    const bool before = static_cast<int>(i) < num_before;
-    names.push_back(fmt::format("{}_{}x{}/{:06d}.pgm", before ? "t1" : "t2", images[i].width,
-                                images[i].height, i));
+  for (size_t i = 0; i < photos.images.size(); ++i) {
+    const bool before = static_cast<int>(i) < photos.num_before;
+    names.push_back(fmt::format("{}_{}x{}/{:06d}.pgm", before ? "t1" : "t2", photos.images[i].width,
+                                photos.images[i].height, i));
   }
   return names;
 }
@@ -54,8 +55,8 @@ void write_features(const Features& features, const fs::path& path) {
   if (!out.flush()) throw_error(ErrorCode::kOutput, "{}: cannot be written", path.string());
 }
 
-void write_matches(const std::vector<PhotoPair>& pairs, const std::vector<std::string>& names,
-                   const fs::path& path) {
+void write_match_list(const std::vector<PhotoPair>& pairs, const std::vector<std::string>& names,
+                      const fs::path& path) {
   std::ofstream out(path);
   for (const PhotoPair& pair : pairs) {
     fmt::print(out, "{} {}\n", names[static_cast<size_t>(pair.first)],
@@ -68,11 +69,12 @@ void write_matches(const std::vector<PhotoPair>& pairs, const std::vector<std::s
 
 class Colmap {
  public:
-  explicit Colmap(fs::path scratch) : scratch_(std::move(scratch)) {}
+  explicit Colmap(fs::path folder) : folder_(std::move(folder)) {}
 
-  int status(std::vector<std::string> arguments) const {
+  int status(std::vector<std::string> arguments,
+             const std::function<void()>& while_running = {}) const {
     arguments.insert(arguments.begin(), "colmap");
-    return run_program(arguments, log(), kRemedy);
+    return run_program(arguments, log(), kRemedy, while_running);
   }
   void run(const std::vector<std::string>& arguments) const {
     if (const int found = status(arguments); found != 0) {
@@ -81,56 +83,168 @@ class Colmap {
                   arguments.front(), found, log().string());
     }
   }
-  fs::path log() const { return scratch_ / "colmap.log"; }
+  fs::path log() const { return folder_ / "colmap.log"; }
+  // How many photos the mapper has tried to place since the last line that starts a model.
+  int placed() const {
+    int count = 0;
+    std::ifstream file(log());
+    for (std::string line; std::getline(file, line);) {
+      if (line.starts_with("Registering image")) ++count;
+      if (line.starts_with("Initializing with")) count = 2;
+    }
+    return count;
+  }
 
  private:
-  fs::path scratch_;
+  fs::path folder_;
 };
 
-// Imports everything with this first guess of the focal lengths, and runs the mapper. A mapper that
-// finds nothing writes no model; the largest of several is taken.
-SfmModel map_with_focal(double focal_factor, const SfmOptions& options, const fs::path& scratch) {
-  const Colmap colmap(scratch);
-  const std::string database = (scratch / fmt::format("focal_{}.db", focal_factor)).string();
-  const std::string images = (scratch / "images").string();
-  const fs::path models = scratch / fmt::format("focal_{}", focal_factor);
-  fs::create_directories(models);
-  colmap.run({"feature_importer", "--database_path", database, "--image_path", images,
-              "--import_path", (scratch / "features").string(), "--ImageReader.camera_model",
-              "SIMPLE_RADIAL", "--ImageReader.single_camera_per_folder", "1",
-              "--ImageReader.default_focal_length_factor", std::to_string(focal_factor)});
-  colmap.run({"matches_importer", "--database_path", database, "--match_list_path",
-              (scratch / "matches.txt").string(), "--match_type", "raw", "--SiftMatching.use_gpu",
-              "0", "--SiftMatching.num_threads", "1", "--SiftMatching.min_num_inliers",
-              std::to_string(options.min_pair_inliers)});
-  const int status = colmap.status({"mapper",
-                                    "--database_path",
-                                    database,
-                                    "--image_path",
-                                    images,
-                                    "--output_path",
-                                    models.string(),
-                                    "--Mapper.num_threads",
-                                    "1",
-                                    "--Mapper.extract_colors",
-                                    "0",
-                                    "--Mapper.min_model_size",
-                                    "3",
-                                    "--Mapper.max_num_models",
-                                    "3",
-                                    "--Mapper.init_min_tri_angle",
-                                    std::to_string(options.init_min_tri_angle_deg),
-                                    "--Mapper.init_min_num_inliers",
-                                    std::to_string(options.init_min_num_inliers),
-                                    "--Mapper.abs_pose_min_num_inliers",
-                                    "20"});
-  SfmModel best;
-  if (status != 0) return best;
-  for (int i = 0; fs::exists(models / std::to_string(i) / "points3D.bin"); ++i) {
-    SfmModel model = read_colmap_model(models / std::to_string(i));
-    if (model.views.size() > best.views.size()) best = std::move(model);
+// What COLMAP is given: images/, features/, matches.txt and the cameras.
+class Mapper {
+ public:
+  Mapper(const SfmPhotos& photos, const std::vector<std::string>& names,
+         const SparseMatches& matches, const SfmOptions& options, fs::path folder)
+      : photos_(photos), names_(names), options_(options), folder_(std::move(folder)) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    for (size_t i = 0; i < names.size(); ++i) {
+      write_image(photos.images[i], folder_ / "images" / names[i]);
+      write_features(matches.features[i], folder_ / "features" / (names[i] + ".txt"));
+    }
+    write_match_list(matches.pairs, names, folder_ / "matches.txt");
   }
-  return best;
+
+  // Runs with this first guess of unknown focal lengths; the folder of the model with most photos,
+  // nothing if there is none.
+  std::optional<fs::path> run(double focal_factor, ProgressStage& stage) const {
+    const Colmap colmap(folder_);
+    const std::string database = (folder_ / fmt::format("focal_{}.db", focal_factor)).string();
+    const fs::path models = folder_ / fmt::format("focal_{}", focal_factor);
+    fs::create_directories(models);
+    for (const bool before : {true, false}) import(colmap, before, focal_factor, database);
+    colmap.run({"matches_importer", "--database_path", database, "--match_list_path",
+                (folder_ / "matches.txt").string(), "--match_type", "raw", "--SiftMatching.use_gpu",
+                "0", "--SiftMatching.num_threads", "1", "--SiftMatching.min_num_inliers",
+                std::to_string(options_.min_pair_inliers)});
+    const auto show = [&] {
+      stage.advance(0.98 * colmap.placed() / static_cast<double>(names_.size()));
+    };
+    const int status = colmap.status({"mapper",
+                                      "--database_path",
+                                      database,
+                                      "--image_path",
+                                      (folder_ / "images").string(),
+                                      "--output_path",
+                                      models.string(),
+                                      "--Mapper.num_threads",
+                                      "1",
+                                      "--Mapper.extract_colors",
+                                      "0",
+                                      "--Mapper.min_model_size",
+                                      "3",
+                                      "--Mapper.max_num_models",
+                                      "3",
+                                      "--Mapper.init_min_tri_angle",
+                                      std::to_string(options_.init_min_tri_angle_deg),
+                                      "--Mapper.init_min_num_inliers",
+                                      std::to_string(options_.init_min_num_inliers),
+                                      "--Mapper.abs_pose_min_num_inliers",
+                                      "20"},
+                                     show);
+    if (status != 0) return std::nullopt;  // it found nothing
+    std::optional<fs::path> best;
+    size_t most = 0;
+    for (int i = 0; fs::exists(models / std::to_string(i) / "points3D.bin"); ++i) {
+      const size_t views = read_colmap_model(models / std::to_string(i)).views.size();
+      if (views <= most) continue;
+      most = views;
+      best = models / std::to_string(i);
+    }
+    return best;
+  }
+
+ private:
+  void import(const Colmap& colmap, bool before, double focal_factor,
+              const std::string& database) const {
+    const auto& known = before ? photos_.camera_t1 : photos_.camera_t2;
+    const fs::path list = folder_ / (before ? "t1.txt" : "t2.txt");
+    std::ofstream out(list);
+    for (size_t i = 0; i < names_.size(); ++i) {
+      if ((static_cast<int>(i) < photos_.num_before) == before) out << names_[i] << "\n";
+    }
+    if (!out.flush()) throw_error(ErrorCode::kOutput, "{}: cannot be written", list.string());
+    std::vector<std::string> arguments = {"feature_importer",
+                                          "--database_path",
+                                          database,
+                                          "--image_path",
+                                          (folder_ / "images").string(),
+                                          "--image_list_path",
+                                          list.string(),
+                                          "--import_path",
+                                          (folder_ / "features").string(),
+                                          "--ImageReader.single_camera_per_folder",
+                                          "1",
+                                          "--ImageReader.camera_model",
+                                          known ? "SIMPLE_PINHOLE" : "SIMPLE_RADIAL"};
+    if (known) {
+      arguments.insert(arguments.end(), {"--ImageReader.camera_params",
+                                         fmt::format("{},{},{}", known->focal_px, known->cx + 0.5,
+                                                     known->cy + 0.5)});
+    } else {
+      arguments.insert(arguments.end(),
+                       {"--ImageReader.default_focal_length_factor", std::to_string(focal_factor)});
+    }
+    colmap.run(arguments);
+  }
+
+  const SfmPhotos& photos_;
+  const std::vector<std::string>& names_;
+  const SfmOptions& options_;
+  fs::path folder_;
+};
+
+// Stage 1: key points and matches, from scratch/matches.npz if they are there.
+SparseMatches find_matches(const std::vector<Image>& images, const SfmOptions& options,
+                           const fs::path& scratch, ProgressSink& progress) {
+  const fs::path kept = scratch / "matches.npz";
+  if (fs::exists(kept)) return read_matches(kept);
+  SparseMatches matches;
+  {
+    ProgressStage stage(progress, "key points");
+    matches.features = extract_features(images, options.max_features, stage);
+  }
+  ProgressStage stage(progress, "matching");
+  matches.pairs = match_all(matches.features, options.min_pair_inliers, stage);
+  write_matches(kept, matches);
+  return read_matches(kept);  // what is kept is what is used
+}
+
+// Stage 2: COLMAP's model, from scratch/model if it is there; an empty folder says that none was
+// found.
+SfmModel find_model(const SfmPhotos& photos, const std::vector<std::string>& names,
+                    const SparseMatches& matches, const SfmOptions& options,
+                    const fs::path& scratch, ProgressSink& progress) {
+  const fs::path kept = scratch / "model";
+  if (!fs::exists(kept)) {
+    ProgressStage stage(progress, "structure from motion");
+    constexpr double kEnough = 0.9;
+    const Mapper mapper(photos, names, matches, options, scratch / "colmap");
+    std::optional<fs::path> best;
+    size_t most = 0;
+    for (const double focal_factor : {1.2, 0.85}) {
+      const std::optional<fs::path> found = mapper.run(focal_factor, stage);
+      const size_t views = found ? read_colmap_model(*found).views.size() : 0;
+      if (views > most) {
+        most = views;
+        best = found;
+      }
+      if (static_cast<double>(views) >= kEnough * static_cast<double>(names.size())) break;
+    }
+    const fs::path empty = scratch / "colmap" / "none";
+    fs::create_directories(empty);
+    fs::rename(best ? *best : empty, kept);
+  }
+  return fs::is_empty(kept) ? SfmModel{} : read_colmap_model(kept);
 }
 
 }  // namespace
@@ -156,34 +270,13 @@ void SfmOptions::validate() const {
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const fs::path& scratch, ProgressSink& progress) {
   options.validate();
-  fs::remove_all(scratch);
   fs::create_directories(scratch);
+  const std::vector<std::string> names = colmap_names(photos);
+  SparseMatches matches = find_matches(photos.images, options, scratch, progress);
   SfmResult result;
+  result.model = find_model(photos, names, matches, options, scratch, progress);
+  result.pairs = std::move(matches.pairs);
   result.reduced = std::move(photos.images);
-  const std::vector<std::string> names = colmap_names(result.reduced, photos.num_before);
-  std::vector<Features> features;
-  {
-    ProgressStage stage(progress, "key points");
-    features = extract_features(result.reduced, options.max_features, stage);
-  }
-  for (size_t i = 0; i < names.size(); ++i) {
-    write_image(result.reduced[i], scratch / "images" / names[i]);
-    write_features(features[i], scratch / "features" / (names[i] + ".txt"));
-  }
-  {
-    ProgressStage stage(progress, "matching");
-    result.pairs = match_all(features, options.min_pair_inliers, stage);
-  }
-  write_matches(result.pairs, names, scratch / "matches.txt");
-  ProgressStage stage(progress, "structure from motion");
-  constexpr double kEnough = 0.9;
-  for (const double focal_factor : {1.2, 0.85}) {
-    SfmModel model = map_with_focal(focal_factor, options, scratch);
-    if (model.views.size() > result.model.views.size()) result.model = std::move(model);
-    const auto found = static_cast<double>(result.model.views.size());
-    if (found >= kEnough * static_cast<double>(names.size())) break;
-    stage.advance(0.5);
-  }
   for (const SfmView& view : result.model.views) {
     const auto at = std::find(names.begin(), names.end(), view.name);
     check(at != names.end(), "structure_from_motion: a view is one of the photos");

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
@@ -25,10 +26,17 @@ struct SfmOptions {
 // The photo with its longer side at most max_side_px.
 Image reduced_photo(const Image& photo, int max_side_px);
 
+// A camera that is known: frames of a prediction, without distortion. In px of the reduced photos,
+// pixel centres at integers.
+struct KnownCamera {
+  double focal_px = 0, cx = 0, cy = 0;
+};
+
 // The photos of one job, reduced: both epochs, before first.
 struct SfmPhotos {
   std::vector<Image> images;
   int num_before = 0;
+  std::optional<KnownCamera> camera_t1, camera_t2;  // of all photos of the epoch
 };
 
 struct SfmResult {
@@ -39,10 +47,12 @@ struct SfmResult {
 };
 
 // Features and matches by features.h, then COLMAP's incremental mapper as a child process with one
-// thread (its results depend on the number of threads), files and log in `scratch`, which is
-// created. Cameras are SIMPLE_RADIAL, one for each epoch and photo size; their focal lengths start
-// at 1.2 and, where that leaves photos out, at 0.85 times the longer side. Chosen is the model with
-// most photos. Throws Error{kUnavailable} without COLMAP; a model without views if none was found.
+// thread (its results depend on the number of threads). Cameras are SIMPLE_RADIAL, one for each
+// epoch and photo size; their focal lengths start at 1.2 and, where that leaves photos out, at 0.85
+// times the longer side. Known ones are SIMPLE_PINHOLE and start as they are. Chosen is the model
+// with most photos. `scratch` keeps the two stages, matches.npz and model/; what an earlier call
+// with the same photos and options left there is used. Throws Error{kUnavailable} without COLMAP; a
+// model without views if none was found.
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const std::filesystem::path& scratch, ProgressSink& progress);
 

@@ -18,6 +18,7 @@ struct TrustOptions {
   double min_angle_deg = 2.0;         // median over points of the widest angle between their rays
   double max_homography_share = 0.9;  // median over pairs: matches that one plane explains
   double min_consistent_share = 0.1;  // of an epoch's pixels, with depth that photos agree on
+  double min_frame_share = 0.02;      // of a photo's pixels; a photo below it is left out
 };
 
 struct SfmTrust {

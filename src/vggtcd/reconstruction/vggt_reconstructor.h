@@ -10,11 +10,13 @@ namespace vggtcd {
 
 struct VggtReconstructorOptions {
   std::filesystem::path weights;
-  int keyframes = 5;  // per epoch, in the joint pass
+  int keyframes = 5;        // per epoch, in the joint pass
+  int frame_side_px = 518;  // longer side of a frame, a multiple of 14
   VggtOptions network;
 };
 
-// Three passes, each kept in the scratch folder as a prediction file and not made again.
+// A pass over each epoch that is not given, and one over keyframes of both. Photos beside a given
+// prediction are fitted to the size of its frames.
 class VggtReconstructor : public Reconstructor {
  public:
   explicit VggtReconstructor(VggtReconstructorOptions options) : options_(std::move(options)) {}
@@ -22,8 +24,8 @@ class VggtReconstructor : public Reconstructor {
   bool leaves_holes() const override { return false; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
-  EpochReconstructions reconstruct(const PhotoEpochs& photos, const std::filesystem::path& scratch,
-                                   ProgressSink& progress) const override;
+  std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
+                          ProgressSink& progress) const override;
 
  private:
   VggtReconstructorOptions options_;

@@ -8,23 +8,22 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
-#include "vggtcd/io/image_file.h"
 #include "vggtcd/vggt/image_resize.h"
 
 namespace vggtcd {
 namespace {
 
-constexpr int kTarget = 518, kPatch = 14;
+constexpr int kPatch = 14;
 constexpr uint8_t kWhite = 255;
 
-// 14 round(side * (518 / other) / 14), as Python computes it: in this order, ties to even (the
+// 14 round(side * (target / other) / 14), as Python computes it: in this order, ties to even (the
 // default rounding mode of nearbyint).
-int scaled_side(int side, int other) {
-  const double patches = side * (static_cast<double>(kTarget) / other) / kPatch;
+int scaled_side(int side, int other, int target) {
+  const double patches = side * (static_cast<double>(target) / other) / kPatch;
   return static_cast<int>(std::nearbyint(patches)) * kPatch;
 }
 
-Image on_white(const Image& image, int width, int height) {
+Image centered_on_white(const Image& image, int width, int height) {
   if (image.width == width && image.height == height) return image;
   Image result(width, height);
   std::ranges::fill(result.rgb, kWhite);
@@ -44,22 +43,23 @@ std::span<const EnumName<FitMode>> enum_names(FitMode) {
   return kNames;
 }
 
-Image fit_photo(const Image& photo, FitMode mode, const std::string& name) {
-  int width = kTarget, height = kTarget;
+Image fit_photo(const Image& photo, FitMode mode, const std::string& name, int side) {
+  check(side > 0 && side % kPatch == 0, "fit_photo: a side of whole patches");
+  int width = side, height = side;
   if (mode == FitMode::kCrop || photo.width >= photo.height) {
-    height = scaled_side(photo.height, photo.width);
+    height = scaled_side(photo.height, photo.width, side);
   } else {
-    width = scaled_side(photo.width, photo.height);
+    width = scaled_side(photo.width, photo.height, side);
   }
   if (width == 0 || height == 0) {
     throw_error(ErrorCode::kInput,
                 "{}: {} x {} px is too narrow: at a side of {} px the other would be below {}; cut "
                 "it to the part that matters",
-                name, photo.width, photo.height, kTarget, kPatch / 2);
+                name, photo.width, photo.height, side, kPatch / 2);
   }
-  const int first_row = height > kTarget ? (height - kTarget) / 2 : 0;
-  const Image fitted = resize_bicubic(photo, width, height, first_row, std::min(height, kTarget));
-  return mode == FitMode::kPad ? on_white(fitted, kTarget, kTarget) : fitted;
+  const int first_row = height > side ? (height - side) / 2 : 0;
+  const Image fitted = resize_bicubic(photo, width, height, first_row, std::min(height, side));
+  return mode == FitMode::kPad ? centered_on_white(fitted, side, side) : fitted;
 }
 
 ImageBatch make_batch(std::span<const Image> photos, std::vector<std::string> names,
@@ -88,7 +88,7 @@ ImageBatch make_batch(std::span<const Image> photos, std::vector<std::string> na
   batch.pixels.resize(photos.size() * 3 * plane);
   float* out = batch.pixels.data();
   for (const Image& photo : photos) {
-    const Image full = on_white(photo, width, height);
+    const Image full = centered_on_white(photo, width, height);
     for (size_t c = 0; c < 3; ++c) {
       for (size_t i = 0; i < plane; ++i) *out++ = static_cast<float>(full.rgb[3 * i + c]) / 255.0f;
     }
@@ -96,20 +96,20 @@ ImageBatch make_batch(std::span<const Image> photos, std::vector<std::string> na
   return batch;
 }
 
-ImageBatch load_photos(std::span<const std::filesystem::path> paths,
-                       const PreprocessOptions& options, ProgressSink& progress) {
-  if (paths.empty()) throw_error(ErrorCode::kUsage, "expected at least one photo, found none");
+ImageBatch load_photos(std::span<const PhotoRef> photos, const PreprocessOptions& options,
+                       ProgressSink& progress) {
+  if (photos.empty()) throw_error(ErrorCode::kUsage, "expected at least one photo, found none");
   ProgressStage stage(progress, "photos");
-  std::vector<Image> photos;
+  std::vector<Image> fitted;
   std::vector<std::string> names;
-  for (const std::filesystem::path& path : paths) {
+  for (const PhotoRef& photo : photos) {
     throw_if_interrupted();
-    const Image photo = read_image(path, {options.apply_exif_orientation});
-    photos.push_back(fit_photo(photo, options.mode, path.string()));
-    names.push_back(path.filename().string());
-    stage.advance(static_cast<double>(photos.size()) / static_cast<double>(paths.size()));
+    const Image image = load_photo(photo, {options.apply_exif_orientation});
+    fitted.push_back(fit_photo(image, options.mode, photo.path.string()));
+    names.push_back(photo.name);
+    stage.advance(static_cast<double>(fitted.size()) / static_cast<double>(photos.size()));
   }
-  return make_batch(photos, std::move(names), progress);
+  return make_batch(fitted, std::move(names), progress);
 }
 
 }  // namespace vggtcd

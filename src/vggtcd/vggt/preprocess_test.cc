@@ -97,8 +97,9 @@ TEST(Preprocess, PngFilesGiveTheReferencesBatchBitForBit) {
   for (const auto& [key, file] : golden["files"].items()) {
     if (!file.get<std::string>().ends_with(".png") || key == "09") continue;
     const std::filesystem::path path = kGolden + file.get<std::string>();
+    const PhotoRef photo{path, path.filename().string(), nullptr};
     const ImageBatch batch =
-        load_photos(std::span(&path, 1), {.apply_exif_orientation = false}, silent_progress());
+        load_photos(std::span(&photo, 1), {.apply_exif_orientation = false}, silent_progress());
     EXPECT_EQ(crc_of(bytes_of(batch)), golden["crop"][key]["crc32"]) << key;
     EXPECT_EQ(batch.names, std::vector<std::string>{path.filename().string()});
   }
@@ -146,6 +147,13 @@ TEST(Preprocess, PanoramasOf20000PixelsAreFittedAndStripesRefused) {
     }
   }
   EXPECT_EQ(fit_photo(post, FitMode::kCrop, "p").height, 518);  // the middle of a very tall one
+}
+
+TEST(Preprocess, AnotherSideScalesTheFrame) {
+  const Image photo(640, 480);
+  const Image fitted = fit_photo(photo, FitMode::kCrop, "x", 140);
+  EXPECT_EQ(fitted.width, 140);
+  EXPECT_EQ(fitted.height, 112);  // 105 px are 7.5 patches; ties go to the even number
 }
 
 TEST(Preprocess, NoPhotosIsAnError) { EXPECT_THROW(load_photos({}, {}, silent_progress()), Error); }

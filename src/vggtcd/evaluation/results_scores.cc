@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Results against truth: which frame is which, which pixel is which, and the counting.
+#include "vggtcd/evaluation/results_scores.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/evaluation/synthetic/render.h"
+#include "vggtcd/io/npz.h"
+#include "vggtcd/io/trajectory.h"
+
+namespace vggtcd {
+namespace {
+
+constexpr const char* kSuffix[] = {"_t1", "_t2"};
+constexpr const char* kFolder[] = {"before/", "after/"};
+constexpr uint8_t kUnobserved = 3;  // change.npz, docs/formats.md
+
+std::vector<Rigid3> read_true_epoch(const NpzReader& reader, const std::string& key) {
+  reader.expect_shape(key, std::array<int64_t, 3>{-1, 3, 4});
+  const std::vector<double> values = reader.read<double>(key);
+  std::vector<Rigid3> poses(values.size() / 12);
+  for (size_t k = 0; k < poses.size(); ++k) {
+    const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(&values[12 * k]);
+    poses[k] = {matrix.leftCols<3>(), matrix.col(3)};
+  }
+  return poses;
+}
+
+// "before/0003.jpg" -> 3; nothing if the name is no number.
+int number_in(const std::string& name, const std::string& folder) {
+  const std::string stem = std::filesystem::path(name.substr(folder.size())).stem().string();
+  int number = -1;
+  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
+  return error == std::errc() && end == stem.data() + stem.size() ? number : -1;
+}
+
+// One epoch of the results: its cameras, and the true frame of each of its frames.
+struct ResultFrames {
+  std::vector<Rigid3> poses;
+  std::vector<int> true_frame;
+};
+
+ResultFrames frames_of(const Trajectory& all, const std::string& folder, int true_frames,
+                       const std::filesystem::path& results) {
+  ResultFrames frames;
+  for (const NamedPose& pose : all) {
+    if (!pose.name.starts_with(folder)) continue;
+    frames.poses.push_back(pose.camera_from_world);
+    frames.true_frame.push_back(number_in(pose.name, folder));
+  }
+  const auto named = [&](int frame) { return frame >= 0 && frame < true_frames; };
+  if (std::all_of(frames.true_frame.begin(), frames.true_frame.end(), named)) return frames;
+  if (static_cast<int>(frames.poses.size()) != true_frames) {
+    throw_error(ErrorCode::kInput,
+                "{}: {} has {} frames whose names are not those of the {} photos of the truth",
+                results.string(), folder, frames.poses.size(), true_frames);
+  }
+  for (int k = 0; k < true_frames; ++k) frames.true_frame[static_cast<size_t>(k)] = k;
+  return frames;
+}
+
+struct Maps {
+  size_t frames = 0, height = 0, width = 0;
+  size_t per_frame() const { return height * width; }
+};
+
+Maps maps_of(const NpzReader& reader, const std::string& key) {
+  reader.expect_shape(key, std::array<int64_t, 3>{-1, -1, -1});
+  const std::vector<int64_t>& shape = reader.header(key).shape;
+  return {static_cast<size_t>(shape[0]), static_cast<size_t>(shape[1]),
+          static_cast<size_t>(shape[2])};
+}
+
+// The pixel of a result frame that shows a pixel of the truth: both show the middle of the photo,
+// and the frame is filled. Negative outside.
+int64_t frame_pixel(const Maps& truth, const Maps& frame, size_t u, size_t v) {
+  const auto number = [](size_t value) { return static_cast<double>(value); };
+  const double scale = std::max(number(frame.width) / number(truth.width),
+                                number(frame.height) / number(truth.height));
+  const double x =
+      (number(u) - 0.5 * (number(truth.width) - 1)) * scale + 0.5 * (number(frame.width) - 1) + 0.5;
+  const double y = (number(v) - 0.5 * (number(truth.height) - 1)) * scale +
+                   0.5 * (number(frame.height) - 1) + 0.5;
+  if (x < 0 || y < 0 || x >= number(frame.width) || y >= number(frame.height)) return -1;
+  return static_cast<int64_t>(y) * static_cast<int64_t>(frame.width) + static_cast<int64_t>(x);
+}
+
+constexpr float kNoEvidence = -2, kNotObserved = -1;
+
+// Rank of every pixel of the truth: above `called` exactly where the results say changed.
+struct Ranks {
+  std::vector<float> rank;
+  float called = 0;
+};
+
+Ranks rank_pixels(const NpzReader& change, const std::string& suffix, const ResultFrames& frames,
+                  const Maps& truth, float called) {
+  const Maps maps = maps_of(change, "score" + suffix);
+  if (maps.frames != frames.poses.size()) {
+    throw_error(ErrorCode::kInput, "{}: expected {} frames as in colmap/, found {}", change.name(),
+                frames.poses.size(), maps.frames);
+  }
+  const std::vector<float> score = change.read<float>("score" + suffix);
+  const std::vector<uint8_t> changed = change.read<uint8_t>("changed" + suffix);
+  std::vector<uint8_t> label;
+  if (change.has("label" + suffix)) label = change.read<uint8_t>("label" + suffix);
+  Ranks ranks{std::vector<float>(truth.frames * truth.per_frame(), kNoEvidence), called};
+  for (size_t k = 0; k < maps.frames; ++k) {
+    float* rank = ranks.rank.data() + static_cast<size_t>(frames.true_frame[k]) * truth.per_frame();
+    for (size_t v = 0; v < truth.height; ++v) {
+      for (size_t u = 0; u < truth.width; ++u, ++rank) {
+        const int64_t pixel = frame_pixel(truth, maps, u, v);
+        if (pixel < 0) continue;
+        const size_t i = k * maps.per_frame() + static_cast<size_t>(pixel);
+        if (std::isnan(score[i])) continue;
+        *rank = changed[i] ? called + 1 + score[i] : std::min(score[i], called);
+        if (!label.empty() && label[i] == kUnobserved) *rank = kNotObserved;
+      }
+    }
+  }
+  return ranks;
+}
+
+float largest_score(const NpzReader& change) {
+  float largest = 0;
+  for (const std::string suffix : kSuffix) {
+    for (const float score : change.read<float>("score" + suffix)) {
+      if (score > largest) largest = score;
+    }
+  }
+  return largest;
+}
+
+struct Counts {
+  ScoredPixels evidence, every_pixel;
+  int64_t seen = 0, unseen = 0, unseen_called = 0;
+};
+
+void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks, Counts& counts) {
+  const auto label = truth.read<uint8_t>("changed" + suffix);
+  const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
+  for (size_t pixel = 0; pixel < label.size(); ++pixel) {
+    if (label[pixel] == kLabelVoid) continue;
+    const float rank = ranks.rank[pixel];
+    if (unseen[pixel]) {
+      if (label[pixel] != kLabelUnchanged || rank == kNoEvidence) continue;
+      ++counts.unseen;
+      counts.unseen_called += rank > ranks.called ? 1 : 0;
+      continue;
+    }
+    ++counts.seen;
+    const bool changed = label[pixel] == kLabelChanged;
+    counts.every_pixel.add(rank, changed);
+    if (rank != kNoEvidence) counts.evidence.add(rank, changed);
+  }
+}
+
+}  // namespace
+
+BitemporalTrajectory read_true_cameras(const std::filesystem::path& truth_npz) {
+  const NpzReader reader(truth_npz);
+  return {read_true_epoch(reader, "extrinsic_t1"), read_true_epoch(reader, "extrinsic_t2")};
+}
+
+ResultsScores score_results(const std::filesystem::path& results,
+                            const std::filesystem::path& truth_npz) {
+  const NpzReader truth(truth_npz);
+  const NpzReader change(results / "change.npz");
+  const Trajectory cameras = read_trajectory(results / "colmap", PoseConvention::kCameraFromWorld);
+  const BitemporalTrajectory true_cameras = read_true_cameras(truth_npz);
+  const float called = largest_score(change);
+  Counts counts;
+  BitemporalTrajectory found, expected;
+  for (const int e : {0, 1}) {
+    const std::string suffix = kSuffix[e];
+    const std::vector<Rigid3>& true_poses = e == 0 ? true_cameras.t1 : true_cameras.t2;
+    const Maps maps = maps_of(truth, "changed" + suffix);
+    const ResultFrames frames =
+        frames_of(cameras, kFolder[e], static_cast<int>(true_poses.size()), results);
+    (e == 0 ? found.t1 : found.t2) = frames.poses;
+    for (const int k : frames.true_frame) {
+      (e == 0 ? expected.t1 : expected.t2).push_back(true_poses[static_cast<size_t>(k)]);
+    }
+    count(truth, suffix, rank_pixels(change, suffix, frames, maps, called), counts);
+  }
+  ResultsScores scores;
+  scores.frames_t1 = static_cast<int>(found.t1.size());
+  scores.frames_t2 = static_cast<int>(found.t2.size());
+  scores.true_frames_t1 = static_cast<int>(true_cameras.t1.size());
+  scores.true_frames_t2 = static_cast<int>(true_cameras.t2.size());
+  scores.cameras = evaluate_trajectory(found, expected);
+  scores.evidence_share = static_cast<double>(counts.evidence.scores.size()) /
+                          static_cast<double>(std::max<int64_t>(1, counts.seen));
+  scores.unseen_called_changed = static_cast<double>(counts.unseen_called) /
+                                 static_cast<double>(std::max<int64_t>(1, counts.unseen));
+  scores.evidence = evaluate_changes(counts.evidence, called);
+  scores.every_pixel = evaluate_changes(counts.every_pixel, called);
+  return scores;
+}
+
+}  // namespace vggtcd

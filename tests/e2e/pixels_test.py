@@ -1,0 +1,178 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""detect on the photos of a generated kitchen, without a network: what it finds, and that it survives being killed.
+
+Usage: pixels_test.py PROGRAM TEST_MEDIA [unittest arguments]
+"""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
+TEST_MEDIA = pathlib.Path(sys.argv.pop(1)).resolve()
+ENVIRONMENT = {**os.environ, "VGGTCD_WEIGHTS": "", "HOME": "/nonexistent"}
+SIZE = ("--frame-side", "168")
+
+
+def run(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=500,
+                          env=ENVIRONMENT)
+
+
+def must(*arguments):
+    done = run(*arguments)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def scores(out, truth):
+    path = out.with_suffix(".json")
+    must("evaluate", "--change", out, "--truth", truth, "-o", path)
+    return json.loads(path.read_text())
+
+
+def content(out):
+    """Every file of the results by its name; times, and where the files lie, are taken out."""
+    files = {}
+    for path in sorted(p for p in out.rglob("*") if p.is_file()):
+        name = str(path.relative_to(out))
+        if name == "summary.json":
+            summary = json.loads(path.read_text())
+            del summary["stages"]
+            files[name] = json.dumps(summary)
+        elif name != "report.html":  # shows the times, too
+            files[name] = path.read_bytes()
+    return files
+
+
+@unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
+class Pixels(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.temporary.name)
+        cls.scene = cls.root / "kitchen"
+        must("synthesize", cls.scene, "--scene", "kitchen", "--frames", "8", "--width", "168", "--no-wat")
+        cls.photos = (cls.scene / "before", cls.scene / "after")
+        cls.out = cls.root / "undisturbed"
+        cls.done = must("detect", *cls.photos, "-o", cls.out, *SIZE)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_all_photos_are_placed_and_the_changes_found(self):
+        found = scores(self.out, self.scene / "truth.npz")
+        self.assertEqual((found["frames_t1"], found["frames_t2"]), (8, 8))
+        # Half of what is called changed is right, and half of what changed is called so: at 168 px
+        # this is what plane sweep gives with room to spare, and far from what chance would give
+        # (a fifth of the pixels changed).
+        self.assertGreater(found["evidence"]["precision"], 0.5)
+        self.assertGreater(found["evidence"]["recall"], 0.5)
+        self.assertLess(found["ate_relative"], 0.02)
+        self.assertLess(found["unseen_called_changed"], 0.1)
+
+    def test_says_that_it_is_the_fallback(self):
+        self.assertIn("no network weights", self.done.stderr)
+        self.assertIn("Classical reconstruction (no network)", self.done.stdout)
+        self.assertIn("Classical", json.loads((self.out / "summary.json").read_text())["reconstruction"])
+
+    def kill_after(self, stage, out):
+        """Starts, kills when the stage is reported finished; the stages that were finished by then."""
+        arguments = [PROGRAM, "detect", *self.photos, "-o", out, *SIZE, "--progress", "json"]
+        process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
+                                   text=True, env=ENVIRONMENT)
+        finished = []
+        for line in process.stderr:
+            event = json.loads(line)
+            if event["event"] == "stage_finished":
+                finished.append(event["stage"])
+                if event["stage"] == stage:
+                    process.send_signal(signal.SIGKILL)
+                    break
+        process.stderr.close()
+        self.assertEqual(process.wait(timeout=100), -signal.SIGKILL, stage)
+        return finished
+
+    def test_killed_after_every_stage_it_goes_on_to_the_same_bytes(self):
+        out = self.root / "killed"
+        kept = ["matching", "structure from motion", "before: depth", "after: depth"]
+        stages = ["read photos", "key points", *kept, "read predictions", "coarse alignment", "fine alignment",
+                  "change detection", "free-space votes", "write results"]
+        for number, stage in enumerate(stages):
+            finished = self.kill_after(stage, out)
+            for earlier in set(stages[:number]) & set(kept):
+                self.assertNotIn(earlier, finished, f"made again before {stage}")
+        done = must("detect", *self.photos, "-o", out, *SIZE)
+        self.assertIn("used again", done.stderr)
+        self.assertEqual([p.name for p in self.root.iterdir() if "partial" in p.name], [])
+        killed, undisturbed = content(out), content(self.out)
+        self.assertEqual(killed.keys(), undisturbed.keys())
+        for name in undisturbed:
+            self.assertEqual(killed[name], undisturbed[name], name)
+
+    def test_killed_in_the_middle_of_a_stage_it_goes_on_to_the_same_bytes(self):
+        for stage in ("structure from motion", "before: depth"):
+            out = self.root / ("within " + stage.replace(": ", " "))
+            arguments = [PROGRAM, "detect", *self.photos, "-o", out, *SIZE, "--progress", "json"]
+            process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE,
+                                       stdout=subprocess.DEVNULL, text=True, env=ENVIRONMENT)
+            for line in process.stderr:
+                event = json.loads(line)
+                if event["event"] == "stage_advanced" and event["stage"] == stage:
+                    process.send_signal(signal.SIGKILL)
+                    break
+            process.stderr.close()
+            self.assertEqual(process.wait(timeout=100), -signal.SIGKILL)
+            must("detect", *self.photos, "-o", out, *SIZE)
+            self.assertEqual(content(out), content(self.out))
+
+    def test_a_second_run_reconstructs_nothing(self):
+        out = self.root / "twice"
+        shutil.copytree(self.out, out)
+        done = run("detect", *self.photos, "-o", out, *SIZE, "--progress", "plain")
+        self.assertIn("used again", done.stderr)
+        self.assertNotIn("matching", done.stderr)
+        self.assertEqual(content(out), content(self.out))
+
+    def test_a_video_before_and_a_folder_after(self):
+        video = self.root / "before.avi"
+        made = subprocess.run([TEST_MEDIA, "video", video, *sorted(self.photos[0].iterdir())])
+        if made.returncode == 77:
+            self.skipTest("OpenCV cannot write videos here")
+        out = self.root / "video"
+        must("detect", video, self.photos[1], "-o", out, "--frames", "7", *SIZE)
+        overlays = sorted(p.name for p in (out / "overlays" / "before").iterdir())
+        self.assertEqual(len(overlays), 7)
+        self.assertTrue(all(name.startswith("before") for name in overlays), overlays)
+
+    def test_a_prediction_before_and_photos_after(self):
+        out = self.root / "prediction"
+        done = must("detect", self.scene / "t1.npz", self.photos[1], "-o", out, *SIZE)
+        self.assertIn("given frames placed", done.stdout)
+        # Before is the prediction, in its own scale: the joint reconstruction has found the way.
+        found = scores(out, self.scene / "truth.npz")
+        self.assertEqual((found["frames_t1"], found["frames_t2"]), (8, 8))
+        self.assertLess(found["ate_relative"], 0.05)
+        self.assertGreater(found["evidence"]["recall"], 0.5)
+        given = np.load(self.scene / "t1.npz")["extrinsic"]
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertEqual(summary["inputs"]["before"]["file"], "t1.npz")
+        self.assertEqual(summary["inputs"]["before"]["frames"], len(given))
+
+    def test_photos_before_and_a_prediction_after(self):
+        out = self.root / "prediction_after"
+        must("detect", self.photos[0], self.scene / "t2.npz", "-o", out, *SIZE)
+        self.assertLess(scores(out, self.scene / "truth.npz")["ate_relative"], 0.05)
+
+
+if __name__ == "__main__":
+    unittest.main()
