@@ -154,8 +154,9 @@ void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks
     }
     ++counts.seen;
     const bool changed = label[pixel] == kLabelChanged;
-    counts.every_pixel.add(rank, changed);
-    if (rank != kNoEvidence) counts.evidence.add(rank, changed);
+    const bool called = rank > ranks.called;
+    counts.every_pixel.add(rank, called, changed);
+    if (rank != kNoEvidence) counts.evidence.add(rank, called, changed);
   }
 }
 
@@ -197,8 +198,8 @@ ResultsScores score_results(const std::filesystem::path& results,
                           static_cast<double>(std::max<int64_t>(1, counts.seen));
   scores.unseen_called_changed = static_cast<double>(counts.unseen_called) /
                                  static_cast<double>(std::max<int64_t>(1, counts.unseen));
-  scores.evidence = evaluate_changes(counts.evidence, called);
-  scores.every_pixel = evaluate_changes(counts.every_pixel, called);
+  scores.evidence = evaluate_changes(counts.evidence);
+  scores.every_pixel = evaluate_changes(counts.every_pixel);
   return scores;
 }
 
