@@ -48,8 +48,8 @@ std::vector<JointPass> joint_passes(const BenchmarkOptions& options, size_t fewe
 void predict_scene(const Arguments& arguments, const fs::path& directory, const std::string& scene,
                    ProgressSink& progress) {
   const WatPhotos found = list_wat_photos(fs::path(arguments.data) / scene);
-  const EpochPhotos photos{thinned(found.before, arguments.max_photos),
-                           thinned(found.after, arguments.max_photos)};
+  const PhotoPaths photos{thinned(found.before, arguments.max_photos),
+                          thinned(found.after, arguments.max_photos)};
   VggtOptions network;
   network.precision = arguments.precision;
   const size_t fewer = std::min(photos.before.size(), photos.after.size());

@@ -29,7 +29,7 @@ Json identity(const PhotoEpochs& photos, const VggtReconstructor& network) {
   Json json{{"network", network.fingerprint()}};
   for (const auto& [key, epoch] : {std::pair("t1", &photos.before), {"t2", &photos.after}}) {
     Json list = Json::array();
-    for (const PhotoRef& photo : *epoch) {
+    for (const PhotoRef& photo : epoch->photos) {
       list.push_back(fmt::format("{} {:016x}", photo.name, content_hash(photo)));
     }
     json[key] = std::move(list);
@@ -50,13 +50,17 @@ void claim(const fs::path& directory, const Json& made_from, const std::vector<J
 
 }  // namespace
 
-void predict_epochs(const EpochPhotos& paths, const fs::path& weights, const VggtOptions& network,
+void predict_epochs(const PhotoPaths& paths, const fs::path& weights, const VggtOptions& network,
                     const std::vector<JointPass>& joints, const fs::path& directory,
                     ProgressSink& progress) {
   check(!joints.empty(), "predict_epochs: at least one joint pass");
-  const PhotoEpochs photos{references(paths.before), references(paths.after), {}};
+  const PhotoEpochs photos{
+      {references(paths.before), nullptr}, {references(paths.after), nullptr}, {}};
   // Keyframes are in the names of the files, so they are left out of what identifies the epochs.
-  claim(directory, identity(photos, VggtReconstructor({weights, 0, network})), joints);
+  claim(
+      directory,
+      identity(photos, VggtReconstructor({.weights = weights, .keyframes = 0, .network = network})),
+      joints);
   const fs::path work = directory / "work";
   const int all = static_cast<int>(std::max(paths.before.size(), paths.after.size()));
   for (const JointPass& joint : joints) {
@@ -65,7 +69,9 @@ void predict_epochs(const EpochPhotos& paths, const fs::path& weights, const Vgg
                           fs::exists(directory / kEpochs[1].file);
     if (complete) continue;
     const VggtReconstructor reconstructor(
-        {weights, joint.keyframes == 0 ? all : joint.keyframes, network});
+        {.weights = weights,
+         .keyframes = joint.keyframes == 0 ? all : joint.keyframes,
+         .network = network});
     const int64_t needed = reconstructor.plan(photos).memory_bytes;
     if (&joint != &joints.front() && needed > available_memory_bytes()) {
       progress.notice(fmt::format("{}: left out, its pass needs {:.1f} GB of memory",

@@ -16,7 +16,7 @@ struct JointPass {
   std::string file;   // "joint.npz"
 };
 
-struct EpochPhotos {
+struct PhotoPaths {
   std::vector<std::filesystem::path> before, after;
 };
 
@@ -24,7 +24,7 @@ struct EpochPhotos {
 // there already is not made again, if photos.json says that it comes from the same photos (by their
 // bytes) and network; else it is replaced. A joint pass that does not fit into memory is left out
 // with a notice, but not the first one. Throws what reading photos and weights throws.
-void predict_epochs(const EpochPhotos& photos, const std::filesystem::path& weights,
+void predict_epochs(const PhotoPaths& photos, const std::filesystem::path& weights,
                     const VggtOptions& network, const std::vector<JointPass>& joints,
                     const std::filesystem::path& directory, ProgressSink& progress);
 
