@@ -89,8 +89,8 @@ class LowFrequency {
 };
 
 struct FrameErrors {
-  double factor = 1;  // of an outlier
-  double scale = 1;
+  double size = 1;         // of all errors: the pass's, and an outlier's own
+  double depth_scale = 1;  // of the whole photo
   double focal = 1;
   Rigid3 camera_from_warped;  // after the warp and the drift
 };
@@ -100,14 +100,13 @@ constexpr double kSkyDepthFactor = 2.0;
 
 class PassSimulator {
  public:
-  PassSimulator(const SceneTruth& truth, const ErrorModel& errors, uint64_t seed, uint64_t draw)
+  PassSimulator(const SceneTruth& truth, const std::vector<FrameRef>& frames,
+                const ErrorModel& errors, uint64_t seed, uint64_t draw)
       : truth_(truth),
         errors_(errors),
         key_(mix64(seed, draw)),
-        warp_(0.5 * truth.extent_m, 1.5 * truth.extent_m, Random(key_, {kWarp})),
-        drift_rotation_(0.15 * truth.extent_m, 0.5 * truth.extent_m, Random(key_, {kDrift, 1})),
-        drift_translation_(0.15 * truth.extent_m, 0.5 * truth.extent_m, Random(key_, {kDrift, 2})) {
-  }
+        pass_size_(pass_size(frames, errors)),
+        warp_(truth.extent_m, 3 * truth.extent_m, Random(key_, {kWarp})) {}
 
   std::vector<FrameErrors> draw_frame_errors(const std::vector<FrameRef>& frames) const {
     std::vector<FrameErrors> result;
@@ -117,12 +116,11 @@ class PassSimulator {
     for (size_t k = 0; k < frames.size(); ++k) {
       FrameErrors frame;
       const bool out = outlier.uniform() < errors_.outlier_share && k > 0;
-      frame.factor = out ? errors_.outlier_factor : 1.0;
-      frame.scale = 1 + frame.factor * errors_.frame_scale * scale.normal();
+      frame.size = out ? std::max(pass_size_, errors_.outlier_factor) : pass_size_;
       frame.focal = pass_focal + errors_.focal / 3 * focal.normal();
       const Vector3d turn{drift.normal(), drift.normal(), drift.normal()};
       const Vector3d shift{drift.normal(), drift.normal(), drift.normal()};
-      frame.camera_from_warped = displaced_camera(frames[k], frame.factor, turn, shift);
+      displace_camera(frames[k], turn, shift, scale.normal(), frame);
       result.push_back(frame);
     }
     return result;
@@ -149,12 +147,13 @@ class PassSimulator {
         // Far things are known worse: twice the error at the scene's own size.
         const double far = 1 + std::min(2.0, depth_m[pixel] / truth_.extent_m);
         const double smooth =
-            frame.factor * errors_.depth_low_frequency * far * low.at(us, vs) * (sky ? 8.0 : 1.0);
+            frame.size * errors_.depth_low_frequency * far * low.at(us, vs) * (sky ? 8.0 : 1.0);
         const double fine = errors_.depth_pixel * far * pixel_noise.normal();
-        const double factor = frame.scale * std::exp(smooth + fine);
+        const double factor = frame.depth_scale * std::exp(smooth + fine);
         const double smeared = std::abs(std::log(depth_m[pixel] / ideal[pixel]));
         const double border = std::max(std::abs(us - 0.5), std::abs(vs - 0.5));  // 0.5 at the rim
-        const double error = std::abs(smooth + fine) + smeared + 0.25 * std::abs(frame.scale - 1) +
+        const double error = std::abs(smooth + fine) + smeared +
+                             0.25 * std::abs(frame.depth_scale - 1) +
                              0.3 * errors_.depth_low_frequency * (far + 4 * border * border);
         const double unsure =
             errors_.confidence_noise * (mood.at(us, vs) + 0.5 * pixel_noise.normal());
@@ -175,7 +174,7 @@ class PassSimulator {
   }
 
   Vector3d warp_m(const Vector3d& x) const {
-    return errors_.warp * truth_.extent_m * warp_.value(x);
+    return pass_size_ * errors_.warp * truth_.extent_m * warp_.value(x);
   }
 
   // The camera after the warp: it moves and turns with the world around it.
@@ -183,26 +182,57 @@ class PassSimulator {
                        const Eigen::Matrix3d& extra_turn) const {
     const Vector3d eye = camera_center(camera_from_world);
     const Eigen::Matrix3d turn =
-        small_rotation(errors_.warp * truth_.extent_m * warp_.turn(eye)) * extra_turn;
+        small_rotation(pass_size_ * errors_.warp * truth_.extent_m * warp_.turn(eye)) * extra_turn;
     Rigid3 result;
     result.rotation = camera_from_world.rotation * turn.transpose();
     result.translation = -(result.rotation * (eye + warp_m(eye) + extra_shift_m));
     return result;
   }
 
-  // Drift: cameras near each other err alike, whatever their place in the list (the network knows
-  // no order of photos); 0.8 of the standard deviation is shared so, 0.6 is each photo's own.
-  Rigid3 displaced_camera(const FrameRef& ref, double factor, const Vector3d& own_turn,
-                          const Vector3d& own_shift) const {
+  // A multi-view estimate errs less the more photos see a place, down to what the network cannot do
+  // better; photos of two states contradict each other wherever something changed.
+  static double pass_size(const std::vector<FrameRef>& frames, const ErrorModel& errors) {
+    double count[2] = {};
+    for (const FrameRef& frame : frames) ++count[static_cast<int>(frame.epoch)];
+    const bool both = count[0] > 0 && count[1] > 0;
+    const double per_epoch = both ? 0.5 * (count[0] + count[1]) : count[0] + count[1];
+    return std::sqrt(1 + errors.few_views / per_epoch) * (both ? 1 + errors.two_states : 1.0);
+  }
+
+  // Distance at which the photo's surface weighs in its pose: parallax goes with inverse depth.
+  double mean_parallax_depth_m(const FrameRef& ref) const {
+    const EpochTruth& epoch = truth_.of(ref.epoch);
+    const size_t first = static_cast<size_t>(ref.frame) * epoch.pixels_per_frame();
+    double inverse = 0;
+    int64_t count = 0;
+    for (size_t pixel = first; pixel < first + epoch.pixels_per_frame(); ++pixel) {
+      if (epoch.depth_m[pixel] <= 0) continue;
+      inverse += 1 / static_cast<double>(epoch.depth_m[pixel]);
+      ++count;
+    }
+    return count > 0 ? static_cast<double>(count) / inverse : truth_.extent_m;
+  }
+
+  // Drift: what a camera errs relative to what it sees. (What neighbours err alike is the warp: it
+  // moves their surfaces too.) A misplaced camera that turns about what it sees, and takes its
+  // forward shift off the depth, explains its photo nearly as well as the true one.
+  // pose_depth_consistency is the correlation of rotation and depth scale with that; the rest of
+  // their deviation is their own.
+  void displace_camera(const FrameRef& ref, const Vector3d& turn, const Vector3d& shift,
+                       double scale, FrameErrors& frame) const {
     const Rigid3& camera_from_world =
         truth_.of(ref.epoch).views[static_cast<size_t>(ref.frame)].camera_from_world;
-    const Vector3d eye = camera_center(camera_from_world);
-    const Vector3d turn = 0.8 * drift_rotation_.value(eye) + 0.6 * own_turn;
-    const Vector3d shift = 0.8 * drift_translation_.value(eye) + 0.6 * own_shift;
-    const double rad = errors_.drift_rotation_deg * std::numbers::pi / 180;
-    return warped_camera(camera_from_world,
-                         factor * errors_.drift_translation * truth_.extent_m * shift,
-                         small_rotation(factor * rad * turn));
+    const Vector3d forward = camera_from_world.rotation.row(2).transpose();
+    const Vector3d shift_m = frame.size * errors_.drift_translation * truth_.extent_m * shift;
+    const Vector3d turn_rad =
+        frame.size * errors_.drift_rotation_deg * std::numbers::pi / 180 * turn;
+    const Vector3d shift_of_view = shift_m / mean_parallax_depth_m(ref);
+    const double alike = errors_.pose_depth_consistency, apart = std::sqrt(1 - alike * alike);
+    frame.depth_scale =
+        1 + apart * frame.size * errors_.frame_scale * scale - alike * forward.dot(shift_of_view);
+    frame.camera_from_warped =
+        warped_camera(camera_from_world, shift_m,
+                      small_rotation(apart * turn_rad - alike * forward.cross(shift_of_view)));
   }
 
   // The depth of the warped surface in the warped (not yet drifted) camera; sky far behind.
@@ -257,7 +287,8 @@ class PassSimulator {
   const SceneTruth& truth_;
   const ErrorModel& errors_;
   uint64_t key_;
-  SmoothField warp_, drift_rotation_, drift_translation_;
+  double pass_size_;
+  SmoothField warp_;
 };
 
 double mean_distance_m(const SceneTruth& truth, Epoch which) {
@@ -298,6 +329,8 @@ void ErrorModel::validate() const {
   for_each_field(*this, [](std::string_view name, const double& value, std::string_view) {
     check_field(value >= 0, name, value, "at least 0");
   });
+  check_field(pose_depth_consistency <= 1, "pose_depth_consistency", pose_depth_consistency,
+              "at most 1");
   check_field(outlier_share < 1, "outlier_share", outlier_share, "below 1");
 }
 
@@ -306,7 +339,7 @@ SimulatedPass simulate_pass(const SceneTruth& truth, const std::vector<FrameRef>
                             uint64_t draw) {
   check(!frames.empty(), "simulate_pass: no frames");
   const EpochTruth& any = truth.of(frames[0].epoch);
-  const PassSimulator simulator(truth, errors, seed, draw);
+  const PassSimulator simulator(truth, frames, errors, seed, draw);
   const std::vector<FrameErrors> frame_errors = simulator.draw_frame_errors(frames);
 
   SimulatedPass pass;

@@ -13,13 +13,18 @@
 namespace vggtcd {
 
 // Standard deviations unless said otherwise; "of the extent": relative to SceneTruth::extent_m.
+// Warp, drift, frame_scale and depth_low_frequency are those of a pass with many photos of one
+// state; few_views and two_states say how they grow.
 struct ErrorModel {
-  double warp = 0.003;
+  double warp = 0.006;
   double depth_low_frequency = 0.010;
   double depth_pixel = 0.002;
   double frame_scale = 0.006;
   double drift_rotation_deg = 0.25;
   double drift_translation = 0.002;
+  double pose_depth_consistency = 0.7;
+  double few_views = 3.0;
+  double two_states = 1.0;
   double focal = 0.006;
   double edge_blur_px = 1.5;
   double confidence_noise = 0.35;
@@ -32,10 +37,15 @@ struct ErrorModel {
           "relative depth error per frame that varies over about a quarter of the photo");
     field("depth_pixel", self.depth_pixel, "relative depth error per pixel");
     field("frame_scale", self.frame_scale, "relative depth scale per frame");
-    field("drift_rotation_deg", self.drift_rotation_deg,
-          "error of a camera's rotation, alike for near cameras");
-    field("drift_translation", self.drift_translation,
-          "error of a camera's place, alike for near cameras, of the extent");
+    field("drift_rotation_deg", self.drift_rotation_deg, "error of a camera's rotation");
+    field("drift_translation", self.drift_translation, "error of a camera's place, of the extent");
+    field("pose_depth_consistency", self.pose_depth_consistency,
+          "how far a photo's rotation and depth make up for its camera's misplacement, so that its "
+          "points stay where they are; 0: independent errors, 1: to first order");
+    field("few_views", self.few_views,
+          "errors of a pass grow by sqrt(1 + this / photos per epoch)");
+    field("two_states", self.two_states,
+          "by how much the errors of a pass grow in that half of its photos show another state");
     field("focal", self.focal, "relative focal length of the pass; a third of it per frame");
     field("edge_blur_px", self.edge_blur_px,
           "depth is smeared over this many px of a 518 px photo at depth edges");

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "vggtcd/evaluation/synthetic/dataset.h"
+#include "vggtcd/geometry/umeyama.h"
 #include "vggtcd/scene/point_cloud.h"
 
 namespace vggtcd {
@@ -80,6 +81,65 @@ TEST(SimulatePass, BestFitIsTheNominalSim3WithoutErrors) {
   EXPECT_NEAR(off.scale, 1, 2e-3);
   EXPECT_LT(rotation_angle_rad(off.rotation), 5e-3);
   EXPECT_LT(off.translation.norm(), 5e-3);
+}
+
+std::vector<FrameRef> frames_of(Epoch which, int count) {
+  std::vector<FrameRef> frames;
+  for (int k = 0; k < count; ++k) frames.push_back({which, k});
+  return frames;
+}
+
+TEST(SimulatePass, ErrsMoreWithFewPhotosAndWithTwoStates) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors = no_errors();
+  errors.drift_translation = 0.01;
+  errors.few_views = 3;
+  errors.two_states = 1;
+  // How far off the second camera is, seen from the first; the draws are the same.
+  const auto error_of = [&](std::vector<FrameRef> frames) {
+    const SimulatedPass pass = simulate_pass(truth, frames, 1.0, errors, scene.key, 1);
+    const View& view = truth.of(Epoch::kT1).views[1];
+    return (camera_center(pass.reconstruction.views[1].camera_from_world) -
+            pass.pass_from_world * camera_center(view.camera_from_world))
+        .norm();
+  };
+  std::vector<FrameRef> both = frames_of(Epoch::kT1, 5);
+  for (const FrameRef& frame : frames_of(Epoch::kT2, 5)) both.push_back(frame);
+  const double five = error_of(frames_of(Epoch::kT1, 5)), ten = error_of(frames_of(Epoch::kT1, 10));
+  EXPECT_NEAR(five / ten, std::sqrt((1 + 3.0 / 5) / (1 + 3.0 / 10)), 1e-9);
+  EXPECT_NEAR(error_of(both) / five, 2, 1e-9);
+}
+
+TEST(SimulatePass, PointsStayInPlaceWhenPoseAndDepthAgree) {
+  const auto& [scene, truth] = fixture();
+  const EpochTruth& epoch = truth.of(Epoch::kT1);
+  // What is left of the points' errors after the best similarity, relative to the cameras'.
+  const auto points_against_cameras = [&](double consistency) {
+    ErrorModel errors = no_errors();
+    errors.drift_translation = 0.01;
+    errors.pose_depth_consistency = consistency;
+    SimulatedPass pass = simulate_pass(truth, frames_of(Epoch::kT1, 10), 1.0, errors, scene.key, 1);
+    std::vector<Eigen::Vector3d> points, true_points, eyes, true_eyes;
+    for (View& view : pass.reconstruction.views) {
+      view.pinhole.cx -= 0.5;  // undo the network's half pixel
+      view.pinhole.cy -= 0.5;
+    }
+    for (size_t pixel = 0; pixel < epoch.depth_m.size(); pixel += 101) {
+      if (epoch.depth_m[pixel] <= 0) continue;
+      points.push_back(
+          unproject_pixel(pass.reconstruction, static_cast<uint32_t>(pixel)).cast<double>());
+      true_points.push_back(true_point(epoch, pixel));
+    }
+    for (size_t k = 0; k < epoch.views.size(); ++k) {
+      eyes.push_back(camera_center(pass.reconstruction.views[k].camera_from_world));
+      true_eyes.push_back(camera_center(epoch.views[k].camera_from_world));
+    }
+    return umeyama(points, true_points).rms / umeyama(eyes, true_eyes).rms;
+  };
+  // Rigid photos carry their points along by as much as their cameras err; turning about what they
+  // see, only parallax is left.
+  EXPECT_GT(points_against_cameras(0), 0.7);
+  EXPECT_LT(points_against_cameras(1), 0.5 * points_against_cameras(0));
 }
 
 TEST(SimulatePass, EachPassDrawsItsOwnErrors) {
