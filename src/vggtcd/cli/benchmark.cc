@@ -39,6 +39,7 @@ std::vector<JointPass> joint_passes(const BenchmarkOptions& options, size_t fewe
   std::vector<JointPass> joints = {{options.keyframes, "joint.npz"}};
   if (!options.ablation) return joints;
   for (const int keyframes : kAblationKeyframes) {
+    if (keyframes == options.keyframes) continue;
     if (static_cast<size_t>(keyframes) >= fewer_photos) continue;  // the same as all
     joints.push_back({keyframes, wat_joint_name(keyframes)});
   }

@@ -113,7 +113,8 @@ std::vector<AblationOutcome> run_synthetic_ablation(const SyntheticScene& scene,
   return outcomes;
 }
 
-// With the joint passes over other numbers of keyframes that are there as files.
+// With the joint passes that are there: that of the tables, and files for other numbers of
+// keyframes.
 std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files,
                                               const RegistrationProblem& problem,
                                               const BitemporalTrajectory& truth,
@@ -121,9 +122,12 @@ std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files
   std::vector<AblationOutcome> outcomes;
   for (const int keyframes : kAblationKeyframes) {
     const std::filesystem::path file = files / wat_joint_name(keyframes);
-    if (!std::filesystem::exists(file)) continue;
-    const JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
-    outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, truth));
+    if (std::filesystem::exists(file)) {
+      const JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
+      outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, truth));
+    } else if (problem.joint.keyframes_t1.size() == static_cast<size_t>(keyframes)) {
+      outcomes.push_back(run_budget(keyframes, problem, truth));
+    }
   }
   return outcomes;
 }
