@@ -204,7 +204,7 @@ SceneOutcome run_synthetic_scene(const std::string& name, uint64_t seed,
     const MethodOutcome* method = find_outcome(outcome, alignment);
     if (method == nullptr) continue;
     ProgressStage stage(progress, fmt::format("change, alignment {}", alignment));
-    ChangeBenchmark change = benchmark_changes(truth, problem.before, problem.after,
+    ChangeBenchmark change = benchmark_changes({scene, truth, problem.before, problem.after},
                                                method->t2_from_t1, alignment, progress);
     std::move(change.changes.begin(), change.changes.end(), std::back_inserter(outcome.changes));
     std::move(change.instances.begin(), change.instances.end(),

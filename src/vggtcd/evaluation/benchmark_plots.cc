@@ -7,6 +7,7 @@
 #include <map>
 
 #include "vggtcd/evaluation/benchmark_report.h"
+#include "vggtcd/evaluation/change_tables.h"
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/svg.h"
 
@@ -71,14 +72,15 @@ std::string trajectories_svg(const SuiteReport& report) {
     if (any) methods.push_back(std::move(method));
   }
   constexpr double kPanel = 130, kLeft = 130, kTop = 40;
-  Svg svg(kLeft + kPanel * static_cast<double>(report.scenes.size()) + 10,
+  constexpr double kTitleWidth = 600;
+  Svg svg(std::max(kTitleWidth, kLeft + kPanel * static_cast<double>(report.scenes.size()) + 10),
           kTop + kPanel * static_cast<double>(methods.size()) + 10);
-  svg.text({10, 18}, "Cameras of both epochs from above: true (green), predicted (red)", 13);
+  svg.text({10, 18}, "Cameras from above: true (green), predicted (red); T1 solid, T2 dashed", 13);
   for (size_t column = 0; column < report.scenes.size(); ++column) {
     const SceneOutcome& scene = report.scenes[column];
     const View2d view(scene.true_centers_t1, scene.true_centers_t2);
     const double x = kLeft + kPanel * (static_cast<double>(column) + 0.5);
-    svg.text({x, kTop - 6}, scene.scene, 11, "middle");
+    svg.text({x, kTop - 6}, scene_title(scene), 11, "middle");
     for (size_t row = 0; row < methods.size(); ++row) {
       const Vector2d middle(x, kTop + kPanel * (static_cast<double>(row) + 0.5));
       const double half = 0.5 * kPanel - 5;
@@ -99,10 +101,15 @@ std::string trajectories_svg(const SuiteReport& report) {
 }
 
 std::string ablation_svg(const SuiteReport& report) {
-  // Means over the scenes that have every budget, so that the points compare.
+  // Means over the scenes that have most budgets (frames enough for them), so that the points
+  // compare.
+  size_t budgets = 0;
+  for (const SceneOutcome& scene : report.scenes)
+    budgets = std::max(budgets, scene.ablation.size());
   std::map<int, std::pair<double, double>> sums;
   std::map<int, int> counts;
   for (const SceneOutcome& scene : report.scenes) {
+    if (scene.ablation.size() < budgets) continue;
     for (const AblationOutcome& a : scene.ablation) {
       const int key = a.keyframes == 0 ? 1 << 20 : a.keyframes;
       sums[key].first += a.coarse_ate;
@@ -112,13 +119,13 @@ std::string ablation_svg(const SuiteReport& report) {
   }
   constexpr double kWidth = 480, kHeight = 300, kLeft = 60, kBottom = 250, kTopY = 40;
   Svg svg(kWidth, kHeight);
-  svg.text({kLeft, 20},
-           "Mean ATE over keyframes per epoch: coarse (dashed) and with the fine stage", 11);
+  svg.text({kLeft, 20}, "Mean ATE: coarse (dashed) and with the fine stage", 12);
   double highest = 1e-12;
   for (const auto& [key, sum] : sums) {
     highest = std::max({highest, sum.first / counts[key], sum.second / counts[key]});
   }
   std::vector<Vector2d> coarse, full;
+  std::vector<std::pair<Vector2d, const char*>> circles;
   double x = kLeft + 20;
   for (const auto& [key, sum] : sums) {
     const auto height = [&](double ate) {
@@ -127,7 +134,7 @@ std::string ablation_svg(const SuiteReport& report) {
     coarse.emplace_back(x, height(sum.first / counts[key]));
     full.emplace_back(x, height(sum.second / counts[key]));
     svg.text({x, kBottom + 16}, key == 1 << 20 ? "all" : std::to_string(key), 10, "middle");
-    svg.circle(full.back(), 3, key == 5 ? "#e80" : "#25c");
+    circles.emplace_back(full.back(), key == 5 ? "#e80" : "#25c");
     x += 45;
   }
   for (int tick = 0; tick <= 4; ++tick) {
@@ -138,7 +145,9 @@ std::string ablation_svg(const SuiteReport& report) {
   }
   svg.polyline(coarse, "#25c", 1.5, "5 3");
   svg.polyline(full, "#25c", 1.8);
-  svg.text({kWidth / 2, kHeight - 12}, "keyframes K (orange: the default)", 10, "middle");
+  for (const auto& [center, color] : circles) svg.circle(center, 3, color);
+  svg.text({kWidth / 2, kHeight - 12}, "keyframes K per epoch (orange: the paper's 5)", 10,
+           "middle");
   return svg.finish();
 }
 

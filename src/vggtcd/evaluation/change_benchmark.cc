@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "vggtcd/change/free_space.h"
+#include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/core/error.h"
 
@@ -58,6 +59,28 @@ void score_all_ways(const SceneTruth& truth, const ChangeAnswer& t1, const Chang
   }
 }
 
+// By object id: longest edge of the box / scene extent.
+std::vector<double> object_sizes(const SyntheticScene& scene, double extent_m) {
+  std::vector<double> sizes = {0};
+  for (const SceneObject& object : scene.objects) {
+    sizes.push_back(object.box_m().sizes().maxCoeff() / extent_m);
+  }
+  return sizes;
+}
+
+InstanceScores score_instances(const ChangeProblem& problem, const Sim3& t2_from_t1,
+                               const ChangeSet& changes) {
+  const ChangeInstances found =
+      find_instances(problem.before, problem.after, t2_from_t1, changes, {});
+  const auto pixels = [&](Epoch which, const std::vector<int32_t>& reported) {
+    const EpochTruth& truth = problem.truth.of(which);
+    return InstancePixels{reported, truth.object, truth.label, truth.other_looked};
+  };
+  const InstancePixels epochs[] = {pixels(Epoch::kT1, found.id_t1),
+                                   pixels(Epoch::kT2, found.id_t2)};
+  return evaluate_instances(epochs, object_sizes(problem.scene, problem.truth.extent_m));
+}
+
 }  // namespace
 
 ChangeOutcome score_changes(const std::vector<AnsweredEpoch>& epochs, bool unseen_counted,
@@ -94,18 +117,21 @@ ChangeOutcome score_changes(const std::vector<AnsweredEpoch>& epochs, bool unsee
   return outcome;
 }
 
-ChangeBenchmark benchmark_changes(const SceneTruth& truth, const Reconstruction& before,
-                                  const Reconstruction& after, const Sim3& t2_from_t1,
+ChangeBenchmark benchmark_changes(const ChangeProblem& problem, const Sim3& t2_from_t1,
                                   const std::string& alignment, ProgressSink& progress) {
+  const auto& [scene, truth, before, after] = problem;
   ChangeBenchmark result;
   ChangeSet changes = detect_changes(before, after, t2_from_t1, {});
   score_all_ways(truth, answer_of(changes, changes.t1), answer_of(changes, changes.t2), "distance",
                  alignment, result);
+  result.instances.push_back(
+      {"distance", alignment, score_instances(problem, t2_from_t1, changes)});
   FreeSpaceChange free_space = free_space_changes(before, after, t2_from_t1, {}, progress);
   const std::vector<float> gap_t1 = free_space.t1.gap, gap_t2 = free_space.t2.gap;
   decide_by_labels(std::move(free_space), changes);
   score_all_ways(truth, answer_of(changes.t1, gap_t1), answer_of(changes.t2, gap_t2), "votes",
                  alignment, result);
+  result.instances.push_back({"votes", alignment, score_instances(problem, t2_from_t1, changes)});
   return result;
 }
 

@@ -36,9 +36,16 @@ struct ChangeBenchmark {
   std::vector<InstanceOutcome> instances;
 };
 
-// Both methods, all four ways of counting, with one alignment.
-ChangeBenchmark benchmark_changes(const SceneTruth& truth, const Reconstruction& before,
-                                  const Reconstruction& after, const Sim3& t2_from_t1,
+// The passes that a scene's methods are given, and what is true.
+struct ChangeProblem {
+  const SyntheticScene& scene;
+  const SceneTruth& truth;
+  const Reconstruction& before;
+  const Reconstruction& after;
+};
+
+// Both methods with one alignment: pixels in all four ways of counting, and changed things.
+ChangeBenchmark benchmark_changes(const ChangeProblem& problem, const Sim3& t2_from_t1,
                                   const std::string& alignment, ProgressSink& progress);
 
 // What a method says about the pixels of one epoch. The score ranks (higher: more changed); NaN: no

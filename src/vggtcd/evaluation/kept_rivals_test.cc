@@ -39,7 +39,7 @@ class KeptRivals : public testing::Test {
   int calls_ = 0;
   bool fails_ = false;
   const Reconstruction near_ = one_pixel(1), far_ = one_pixel(2);
-  const JointReconstruction joint_;
+  const JointReconstruction joint_{};
 };
 
 TEST_F(KeptRivals, AnswersAboutTheSamePointsAreGivenOnce) {

@@ -205,7 +205,7 @@ TEST(Render, LeavesOutChangedSurfaceThatTouchesTheOtherEpoch) {
 class EveryScene : public testing::TestWithParam<std::string_view> {};
 
 TEST_P(EveryScene, KeepsItsPromises) {
-  for (const uint64_t seed : {1, 2}) {
+  for (const uint64_t seed : {1u, 2u}) {
     const SyntheticScene scene = make_scene(GetParam(), seed);
     for (const int frames : scene.frames) {
       EXPECT_GE(frames, 20);
@@ -252,7 +252,7 @@ TEST(MakeScene, NothingChangesWhereNothingShall) {
 TEST(MakeScene, MovingDayChangesFortyPercentAndIsNotOneOfTheEleven) {
   EXPECT_EQ(scene_names().size(), 11u);
   EXPECT_EQ(all_scene_names().back(), "moving_day");
-  for (const uint64_t seed : {1, 2, 3}) {
+  for (const uint64_t seed : {1u, 2u, 3u}) {
     const SceneTruth truth =
         render(make_scene("moving_day", seed), small(12, 64), silent_progress());
     EXPECT_GE(changed_share(truth), 0.36) << seed;
@@ -281,7 +281,7 @@ TEST(MakeScene, SeedsDiffer) {
 TEST(MakeScene, EveryNameAndSeedHasRandomNumbersOfItsOwn) {
   std::set<uint64_t> keys;
   for (const std::string_view name : scene_names()) {
-    for (const uint64_t seed : {0, 1, 2, 3}) keys.insert(make_scene(name, seed).key);
+    for (const uint64_t seed : {0u, 1u, 2u, 3u}) keys.insert(make_scene(name, seed).key);
   }
   EXPECT_EQ(keys.size(), 4 * scene_names().size());
 }
