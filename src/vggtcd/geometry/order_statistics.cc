@@ -66,6 +66,7 @@ uint32_t bin_of_rank(std::span<const int64_t> histogram, int64_t& rank) {
 std::vector<float> values_at(const Column& column, std::vector<int64_t> ranks) {
   check(column.count > 0, "order statistics: at least one value");
   check(column.count <= std::numeric_limits<uint32_t>::max(), "order statistics: < 2^32 values");
+  check(ranks.size() < 256, "order statistics: < 256 ranks");
   const Histogram upper =
       count_in_parallel(column.count, kBins, [&](int64_t begin, int64_t end, uint32_t* histogram) {
         bool has_nan = false;
@@ -81,14 +82,16 @@ std::vector<float> values_at(const Column& column, std::vector<int64_t> ranks) {
   std::sort(bins.begin(), bins.end());
   bins.erase(std::unique(bins.begin(), bins.end()), bins.end());
 
+  // 1 + the place of a bin among the distinct ones; 0: of no interest.
+  std::vector<uint8_t> place(kBins, 0);
+  for (size_t b = 0; b < bins.size(); ++b) place[bins[b]] = static_cast<uint8_t>(b + 1);
   const Histogram lower = count_in_parallel(column.count, kBins * bins.size(),
                                             [&](int64_t begin, int64_t end, uint32_t* histogram) {
                                               for (int64_t i = begin; i < end; ++i) {
                                                 const uint32_t bits = ascending_bits(column[i]);
-                                                for (size_t b = 0; b < bins.size(); ++b) {
-                                                  if (bits >> 16 == bins[b])
-                                                    ++histogram[b * kBins + (bits & 0xFFFFu)];
-                                                }
+                                                const size_t b = place[bits >> 16];
+                                                if (b != 0)
+                                                  ++histogram[(b - 1) * kBins + (bits & 0xFFFFu)];
                                               }
                                             });
   std::vector<float> values;

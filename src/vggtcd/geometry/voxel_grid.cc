@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Voxel grid by hashing, one table per thread: the best point of a voxel is a maximum, which does
+// Voxel grid by hashing, tables per thread: the best point of a voxel is a maximum, which does
 // not depend on the order in which points are looked at.
 #include "vggtcd/geometry/voxel_grid.h"
 
@@ -32,63 +32,76 @@ uint32_t index_of(uint64_t rank) {
   return std::numeric_limits<uint32_t>::max() - static_cast<uint32_t>(rank);
 }
 
-// What a table holds of a voxel: the rank of its best point. 0: free slot.
-struct Slot {
-  Voxel voxel;
-  uint64_t rank;
+// The ranks of the best points of 2 x 2 x 2 voxels, one cache line; 0: no point yet. Noise of depth
+// moves neighbouring pixels between neighbouring voxels, so they meet in the same line.
+struct alignas(64) Cube {
+  uint64_t best[8] = {};
 };
+Voxel cube_of(const Voxel& v) { return {v.x >> 1, v.y >> 1, v.z >> 1}; }
+size_t place_in_cube(const Voxel& v) {
+  return static_cast<size_t>((v.x & 1) | (v.y & 1) << 1 | (v.z & 1) << 2);
+}
 
-// Voxel -> highest rank, by open addressing with linear probing, at most three quarters full.
-class VoxelTable {
+// Number of the cube -> cube, by open addressing with linear probing, at most three quarters full.
+class CubeTable {
  public:
-  VoxelTable() : slots_(zeroed(1 << 10)) {}
+  CubeTable() : slots_(zeroed(1 << 10)) {}
 
-  // Enters voxels. The table is larger than the caches and its slots are looked up all over the
-  // place, so their cache lines are asked for together, not one after the other.
-  void raise(std::span<const Slot> entries) {
-    for (const Slot& entry : entries) __builtin_prefetch(&slots_[first_slot(entry.voxel)]);
-    for (const Slot& entry : entries) {
-      if (4 * used_ >= 3 * slots_.size()) grow();
-      Slot& slot = find(entry.voxel);
-      if (slot.rank == 0) {
-        slot = entry;
-        ++used_;
-      } else {
-        slot.rank = std::max(slot.rank, entry.rank);
-      }
+  void prefetch(const Voxel& number) const { __builtin_prefetch(&slots_[first_slot(number)]); }
+
+  // The place in cubes() of this cube, which is made if it is new.
+  size_t find_or_add(const Voxel& number) {
+    if (4 * cubes_.size() >= 3 * slots_.size()) grow();
+    Slot& slot = find(number);
+    if (slot.cube == 0) {
+      cubes_.emplace_back();
+      slot = {number, static_cast<uint32_t>(cubes_.size())};
+    }
+    return slot.cube - 1;
+  }
+
+  std::vector<Cube>& cubes() { return cubes_; }
+
+  // Calls visit(number, cube) for every cube.
+  template <typename Visit>
+  void for_each(const Visit& visit) const {
+    for (const Slot& slot : slots_) {
+      if (slot.cube != 0) visit(slot.number, cubes_[slot.cube - 1]);
     }
   }
 
-  std::span<const Slot> slots() const { return slots_; }
-
  private:
+  struct Slot {
+    Voxel number;
+    uint32_t cube;  // 1 + its place in cubes_; 0: free
+  };
   static LargeArray<Slot> zeroed(size_t size) {
     LargeArray<Slot> slots(size);
     std::ranges::fill(slots, Slot{});
     return slots;
   }
-  size_t first_slot(const Voxel& voxel) const {
+  size_t first_slot(const Voxel& number) const {
     // Odd constants spread each coordinate over the word; the product's upper half is well mixed.
-    uint64_t bits = static_cast<uint32_t>(voxel.x) * 0x9E3779B97F4A7C15u;
-    bits ^= static_cast<uint32_t>(voxel.y) * 0xC2B2AE3D27D4EB4Fu;
-    bits ^= static_cast<uint32_t>(voxel.z) * 0x165667B19E3779F9u;
+    uint64_t bits = static_cast<uint32_t>(number.x) * 0x9E3779B97F4A7C15u;
+    bits ^= static_cast<uint32_t>(number.y) * 0xC2B2AE3D27D4EB4Fu;
+    bits ^= static_cast<uint32_t>(number.z) * 0x165667B19E3779F9u;
     bits = (bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u;
     return static_cast<size_t>(bits >> 32) & (slots_.size() - 1);
   }
-  Slot& find(const Voxel& voxel) {
-    size_t i = first_slot(voxel);
-    while (slots_[i].rank != 0 && slots_[i].voxel != voxel) i = (i + 1) & (slots_.size() - 1);
+  Slot& find(const Voxel& number) {
+    size_t i = first_slot(number);
+    while (slots_[i].cube != 0 && slots_[i].number != number) i = (i + 1) & (slots_.size() - 1);
     return slots_[i];
   }
   void grow() {
     const LargeArray<Slot> old = std::exchange(slots_, zeroed(2 * slots_.size()));
     for (const Slot& slot : old) {
-      if (slot.rank != 0) find(slot.voxel) = slot;
+      if (slot.cube != 0) find(slot.number) = slot;
     }
   }
 
   LargeArray<Slot> slots_;  // a power of two
-  size_t used_ = 0;
+  std::vector<Cube> cubes_;
 };
 
 constexpr size_t kBatch = 256;  // points that are looked at together
@@ -118,50 +131,62 @@ void voxel_numbers(std::span<const float> coordinates, double voxel_size, int32_
   }
 }
 
-// Enters points begin..end. Pixels next to one another often share a voxel and are entered as one.
-void enter(std::span<const Eigen::Vector3f> positions, std::span<const float> confidence,
-           double voxel_size, size_t begin, size_t end, VoxelTable& table) {
+// Enters points begin..end, at most kBatch of them. Table and cubes are larger than the caches, so
+// their lines are asked for together, not one after the other.
+void enter_batch(std::span<const Eigen::Vector3f> positions, std::span<const float> confidence,
+                 double voxel_size, size_t begin, size_t end, CubeTable& table) {
   std::array<int32_t, 3 * kBatch> numbers;
-  std::array<Slot, kBatch> runs;
-  for (; begin < end; begin += kBatch) {
-    const size_t count = std::min(kBatch, end - begin);
-    voxel_numbers({positions[begin].data(), 3 * count}, voxel_size, numbers.data());
-    size_t num_runs = 0;
-    for (size_t i = 0; i < count; ++i) {
-      const Voxel voxel{numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
-      const uint64_t rank = rank_of(confidence[begin + i], static_cast<uint32_t>(begin + i));
-      if (num_runs > 0 && runs[num_runs - 1].voxel == voxel) {
-        runs[num_runs - 1].rank = std::max(runs[num_runs - 1].rank, rank);
-      } else {
-        runs[num_runs++] = {voxel, rank};
-      }
+  voxel_numbers({positions[begin].data(), 3 * (end - begin)}, voxel_size, numbers.data());
+  // Points that follow one another in a cube.
+  struct Run {
+    Voxel cube;
+    size_t begin, place;
+  };
+  std::array<Run, kBatch + 1> runs;
+  size_t num_runs = 0;
+  const auto voxel = [&](size_t i) {
+    const int32_t* number = &numbers[3 * (i - begin)];
+    return Voxel{number[0], number[1], number[2]};
+  };
+  for (size_t i = begin; i < end; ++i) {
+    const Voxel cube = cube_of(voxel(i));
+    if (num_runs > 0 && runs[num_runs - 1].cube == cube) continue;
+    runs[num_runs++] = {cube, i, 0};
+    table.prefetch(cube);
+  }
+  runs[num_runs].begin = end;
+  for (size_t r = 0; r < num_runs; ++r) {
+    runs[r].place = table.find_or_add(runs[r].cube);
+    __builtin_prefetch(&table.cubes()[runs[r].place], 1);
+  }
+  for (size_t r = 0; r < num_runs; ++r) {
+    Cube& cube = table.cubes()[runs[r].place];
+    for (size_t i = runs[r].begin; i < runs[r + 1].begin; ++i) {
+      uint64_t& best = cube.best[place_in_cube(voxel(i))];
+      best = std::max(best, rank_of(confidence[i], static_cast<uint32_t>(i)));
     }
-    table.raise(std::span(runs).first(num_runs));
   }
 }
 
 // Enters what another table holds.
-void enter(const VoxelTable& other, VoxelTable& table) {
-  std::array<Slot, kBatch> entries;
-  size_t count = 0;
-  for (const Slot& slot : other.slots()) {
-    if (slot.rank == 0) continue;
-    entries[count++] = slot;
-    if (count == kBatch) table.raise(std::span(entries).first(std::exchange(count, 0)));
-  }
-  table.raise(std::span(entries).first(count));
+void enter(const CubeTable& other, CubeTable& table) {
+  other.for_each([&](const Voxel& number, const Cube& from) {
+    Cube& to = table.cubes()[table.find_or_add(number)];
+    for (size_t i = 0; i < 8; ++i) to.best[i] = std::max(to.best[i], from.best[i]);
+  });
 }
 
 // The indices of the best points, in ascending order without sorting: one bit per point, then
 // collected.
-std::vector<uint32_t> best_points(const VoxelTable& table, size_t num_points) {
+std::vector<uint32_t> best_points(std::span<const Cube> cubes, size_t num_points) {
   std::vector<uint64_t> is_best((num_points + 63) / 64, 0);
   size_t count = 0;
-  for (const Slot& slot : table.slots()) {
-    if (slot.rank == 0) continue;
-    const uint32_t index = index_of(slot.rank);
-    is_best[index / 64] |= uint64_t{1} << index % 64;
-    ++count;
+  for (const Cube& cube : cubes) {
+    for (const uint64_t rank : cube.best) {
+      if (rank == 0) continue;
+      is_best[index_of(rank) / 64] |= uint64_t{1} << index_of(rank) % 64;
+      ++count;
+    }
   }
   std::vector<uint32_t> best;
   best.reserve(count);
@@ -181,14 +206,18 @@ std::vector<uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> position
   check(positions.size() == confidence.size(), "voxel_downsample: one confidence per position");
   check(positions.size() < std::numeric_limits<uint32_t>::max(), "voxel_downsample: < 2^32 points");
   check(voxel_size > 0 && std::isfinite(voxel_size), "voxel_downsample: voxel_size > 0");
-  std::vector<VoxelTable> tables(static_cast<size_t>(num_threads()));
-  parallel_for_workers(static_cast<int64_t>(positions.size()), 1 << 16,
-                       [&](int64_t begin, int64_t end, int worker) {
-                         enter(positions, confidence, voxel_size, static_cast<size_t>(begin),
-                               static_cast<size_t>(end), tables[static_cast<size_t>(worker)]);
-                       });
+  std::vector<CubeTable> tables(static_cast<size_t>(num_threads()));
+  parallel_for_workers(
+      static_cast<int64_t>(positions.size()), 1 << 16,
+      [&](int64_t chunk_begin, int64_t chunk_end, int worker) {
+        const size_t end = static_cast<size_t>(chunk_end);
+        for (size_t begin = static_cast<size_t>(chunk_begin); begin < end; begin += kBatch) {
+          enter_batch(positions, confidence, voxel_size, begin, std::min(end, begin + kBatch),
+                      tables[static_cast<size_t>(worker)]);
+        }
+      });
   for (size_t worker = 1; worker < tables.size(); ++worker) enter(tables[worker], tables[0]);
-  return best_points(tables[0], positions.size());
+  return best_points(tables[0].cubes(), positions.size());
 }
 
 }  // namespace vggtcd
