@@ -14,17 +14,17 @@
 namespace vggtcd {
 namespace {
 
-// The confident points of an epoch in T2, in pixel order. Which pixels they belong to is not kept:
-// it follows from the same walk over the photos, and at full size every array here has 8.5 million
-// entries.
-LargeArray<Eigen::Vector3f> confident_points(const Reconstruction& epoch, float min_confidence,
-                                             const Sim3& t2_from_epoch, const char* name) {
-  LargeArray<Eigen::Vector3f> positions = unproject_positions(epoch, min_confidence, t2_from_epoch);
-  if (positions.empty()) {
+// The confident points of an epoch in T2, in pixel order: which pixels they belong to follows from
+// the same walk over the photos. Made when they are asked for: at full size every array of them has
+// 8.5 million entries.
+ConfidentPoints confident_points(const Reconstruction& epoch, float min_confidence,
+                                 const Sim3& t2_from_epoch, const char* name) {
+  ConfidentPoints points(epoch, min_confidence, t2_from_epoch);
+  if (points.size() == 0) {
     throw_error(ErrorCode::kDegenerate, "{} epoch: no point is left above the median confidence",
                 name);
   }
-  return positions;
+  return points;
 }
 
 EpochChange scatter(const std::vector<float>& distance, const Reconstruction& epoch,
@@ -60,17 +60,14 @@ ChangeSet detect_changes(const Reconstruction& before, const Reconstruction& aft
   ChangeSet result;
   std::vector<float> distance_t1, distance_t2;
   {
-    // One epoch after the other: an index holds its points, so its input goes before the next one
-    // comes.
-    const NearestNeighborIndex index_t1(
-        confident_points(before, min_confidence_t1, t2_from_t1, "before"));
-    LargeArray<Eigen::Vector3f> positions_t2 =
-        confident_points(after, min_confidence_t2, {}, "after");
-    result.scene_extent_u = robust_extent(positions_t2);
+    const ConfidentPoints points_t1 =
+        confident_points(before, min_confidence_t1, t2_from_t1, "before");
+    const ConfidentPoints points_t2 = confident_points(after, min_confidence_t2, {}, "after");
+    result.scene_extent_u = robust_extent(unproject(after, min_confidence_t2).positions);
     result.threshold_u = options.threshold_fraction * result.scene_extent_u;
     result.bound_u = options.bound_fraction * result.scene_extent_u;
-    const NearestNeighborIndex index_t2(positions_t2);
-    positions_t2 = {};
+    const NearestNeighborIndex index_t1(points_t1);
+    const NearestNeighborIndex index_t2(points_t2);
 
     const float bound = static_cast<float>(result.bound_u);
     distance_t1.resize(index_t1.size());

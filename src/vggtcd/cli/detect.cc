@@ -58,13 +58,18 @@ void add_detect(Program& program) {
     }
     fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
                outcome.moved);
-    fmt::print("Look at {0}/report.html, {0}/overlays, {0}/before_aligned.ply and {0}/after.ply.\n",
+    fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
+               arguments->options.page ? epochs.out + "/report.html, " : "",
+               arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
                epochs.out);
   };
   CLI::App* command =
       add_command(program, program.app, "detect",
                   "Find what changed in 3D between two sets of photos of one place.", run);
   arguments->epochs.add_to(command);
+  command->get_option("BEFORE")->description(
+      "The before epoch, T1: photos (a folder, a pattern or a video) or predictions (.npz).");
+  command->get_option("AFTER")->description("The after epoch, T2: the same.");
   command
       ->add_option("--frames", arguments->photos.frames,
                    "At most this many photos per epoch, evenly spread; 0 takes all, and 40 of a "

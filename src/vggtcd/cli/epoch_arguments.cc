@@ -11,15 +11,18 @@ void EpochArguments::add_to(CLI::App* command) {
       ->required();
   command->add_option("AFTER", after, "The after epoch, T2.")->required();
   command->add_option("-o,--out", out, "Directory for the results; it appears when complete.")
+      ->type_name("DIRECTORY")
       ->required();
   command
       ->add_option("--joint", joint,
                    "Predictions of the joint pass (.npz): K keyframes of T1, then K of T2, with "
                    "keyframes_t1 and keyframes_t2.")
+      ->type_name("FILE")
       ->group("How the epochs come together (predictions: exactly one)");
   command
       ->add_option("--initial-sim3", initial_sim3,
                    "A sim3.json with scale, rotation and translation: x_T2 = s R x_T1 + t.")
+      ->type_name("FILE")
       ->group("How the epochs come together (predictions: exactly one)");
   command->add_flag("--aligned", aligned, "Both epochs are in one frame and scale already.")
       ->group("How the epochs come together (predictions: exactly one)");

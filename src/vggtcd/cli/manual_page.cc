@@ -56,7 +56,8 @@ std::string ManualPage::make_option(const CLI::Option* option, bool is_positiona
   term = CLI::detail::find_and_replace(term, "{false}", "");
   term = CLI::detail::find_and_replace(term, ",", ", ");
   const bool takes_value = option->get_type_size() != 0;
-  if (takes_value && !is_positional) term += " " + type_of(*option);
+  const std::string type = type_of(*option);
+  if (takes_value && !is_positional && !type.empty()) term += " " + type;
   if (option->get_expected_max() == CLI::detail::expected_max_vector_size) term += " ...";
   std::string description = option->get_description();
   if (takes_value && !option->get_default_str().empty()) {

@@ -90,51 +90,77 @@ constexpr size_t kBuckets = 1 << 6 * kDoubleStepsOfBucket;
 struct Bounds {
   Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Array3f high = -low;
+
+  void include(const Eigen::Array3f& x) {
+    low = low.min(x);
+    high = high.max(x);
+  }
+  void include(const Bounds& other) {
+    low = low.min(other.low);
+    high = high.max(other.high);
+  }
 };
 
-Eigen::Array3f array_of(const Eigen::Vector3f& x) { return x.array(); }
 Eigen::Array3f array_of(const IndexedPoint& p) { return {p.x, p.y, p.z}; }
 
 constexpr int64_t kGrain = 1 << 16;
 
-template <typename Point>
-Bounds bounds_of(std::span<Point> points) {
+Bounds bounds_of(std::span<const IndexedPoint> points) {
   const auto size = static_cast<int64_t>(points.size());
   std::vector<Bounds> partial(static_cast<size_t>(num_chunks(size, kGrain)));
   parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
-    Bounds bounds;
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      bounds.low = bounds.low.min(array_of(points[i]));
-      bounds.high = bounds.high.max(array_of(points[i]));
-    }
-    partial[static_cast<size_t>(begin / kGrain)] = bounds;
+    Bounds& bounds = partial[static_cast<size_t>(begin / kGrain)];
+    for (int64_t i = begin; i < end; ++i) bounds.include(array_of(points[static_cast<size_t>(i)]));
   });
   Bounds all;
-  for (const Bounds& bounds : partial) {
-    all.low = all.low.min(bounds.low);
-    all.high = all.high.max(bounds.high);
-  }
+  for (const Bounds& bounds : partial) all.include(bounds);
   return all;
 }
 
-// The box of most points, by the 2nd and 98th percentile of a sample, with a margin. What it leaves
-// out costs a little order at its border; a box of all points could be mostly empty.
-Bounds bounds_of_most(std::span<const Eigen::Vector3f> points) {
-  constexpr size_t kSample = 4096;
-  const size_t stride = std::max<size_t>(1, points.size() / kSample);
-  Bounds bounds;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::vector<float> sample;
-    for (size_t i = 0; i < points.size(); i += stride) sample.push_back(points[i][axis]);
-    std::ranges::sort(sample);
-    const float low = sample[sample.size() / 50],
-                high = sample[sample.size() - 1 - sample.size() / 50];
-    const float margin = (high - low) / 4;
-    bounds.low[axis] = low - margin;
-    bounds.high[axis] = high + margin;
+// A first look at all points: checks them.
+struct Survey {
+  Bounds all;
+  std::vector<Eigen::Vector3f> sample;  // every so many-th
+
+  explicit Survey(const PointSource& points) {
+    constexpr size_t kSample = 4096;
+    const size_t stride = std::max<size_t>(1, points.size() / kSample);
+    std::vector<Survey> partial(points.num_chunks());
+    points.for_each_chunk([&](size_t k, std::span<const Eigen::Vector3f> chunk) {
+      bool valid = true;
+      for (const Eigen::Vector3f& x : chunk) {
+        valid &= (x.array().abs() < 1e18f).all();  // false for NaN
+        partial[k].all.include(x.array());
+      }
+      check(valid, "hilbert_order: finite positions below 1e18");
+      const size_t start = points.starts()[k];
+      for (size_t i = (stride - start % stride) % stride; i < chunk.size(); i += stride) {
+        partial[k].sample.push_back(chunk[i]);
+      }
+    });
+    for (const Survey& part : partial) {
+      all.include(part.all);
+      sample.insert(sample.end(), part.sample.begin(), part.sample.end());
+    }
   }
-  return bounds;
-}
+  Survey() = default;
+
+  // The box of most points, by the 2nd and 98th percentile of the sample, with a margin. What it
+  // leaves out costs a little order at its border; a box of all points could be mostly empty.
+  Bounds of_most() const {
+    Bounds bounds;
+    std::vector<float> values(sample.size());
+    for (int axis = 0; axis < 3; ++axis) {
+      for (size_t i = 0; i < sample.size(); ++i) values[i] = sample[i][axis];
+      std::ranges::sort(values);
+      const size_t outside = values.size() / 50;
+      const float low = values[outside], high = values[values.size() - 1 - outside];
+      bounds.low[axis] = low - (high - low) / 4;
+      bounds.high[axis] = high + (high - low) / 4;
+    }
+    return bounds;
+  }
+};
 
 // A cube divided into cells; what is outside counts to the nearest cell.
 class CellGrid {
@@ -170,21 +196,16 @@ using Item = uint64_t;
 uint32_t place_of(Item item) { return static_cast<uint32_t>(item); }
 uint32_t key_of(Item item) { return static_cast<uint32_t>(item >> 32); }
 
-// Stable counting sort on all threads, by chunks: bucket_of(i) < buckets, move(i, place). Returns
-// where each bucket starts, and the end.
-template <typename BucketOf, typename Move>
-std::vector<uint32_t> distribute(size_t size, size_t buckets, const BucketOf& bucket_of,
-                                 const Move& move) {
-  const auto count = static_cast<int64_t>(size);
-  std::vector<uint32_t> next(static_cast<size_t>(num_chunks(count, kGrain)) * buckets, 0);
-  const auto of_chunk = [&](int64_t begin) {
-    return next.data() + static_cast<size_t>(begin / kGrain) * buckets;
-  };
-  parallel_for(count, kGrain, [&](int64_t begin, int64_t end) {
-    uint32_t* counts = of_chunk(begin);
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      ++counts[bucket_of(i)];
-    }
+// Stable counting sort on all threads. each_chunk(visit) calls visit(chunk, its elements) for all
+// chunks; an element goes to the bucket bucket_of(element) < buckets by move(element, chunk, number
+// in the chunk, place). Returns where each bucket starts, and the end.
+template <typename EachChunk, typename BucketOf, typename Move>
+std::vector<uint32_t> distribute(size_t chunks, size_t buckets, const EachChunk& each_chunk,
+                                 const BucketOf& bucket_of, const Move& move) {
+  std::vector<uint32_t> next(chunks * buckets, 0);
+  each_chunk([&](size_t chunk, const auto& elements) {
+    uint32_t* counts = next.data() + chunk * buckets;
+    for (const auto& element : elements) ++counts[bucket_of(element)];
   });
   std::vector<uint32_t> starts(buckets + 1);
   uint32_t start = 0;
@@ -193,10 +214,10 @@ std::vector<uint32_t> distribute(size_t size, size_t buckets, const BucketOf& bu
     for (size_t i = bucket; i < next.size(); i += buckets) start += std::exchange(next[i], start);
   }
   starts.back() = start;
-  parallel_for(count, kGrain, [&](int64_t begin, int64_t end) {
-    uint32_t* places = of_chunk(begin);
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      move(i, places[bucket_of(i)]++);
+  each_chunk([&](size_t chunk, const auto& elements) {
+    uint32_t* places = next.data() + chunk * buckets;
+    for (size_t i = 0; i < elements.size(); ++i) {
+      move(elements[i], chunk, i, places[bucket_of(elements[i])]++);
     }
   });
   return starts;
@@ -237,10 +258,18 @@ class RangeSorter {
     }
     moved_.resize(items_.size());
     for (int shift = 32; shift < 32 + key_bits; shift += kDigitBits) {
+      const auto size = static_cast<int64_t>(items_.size());
       distribute(
-          items_.size(), size_t{1} << kDigitBits,
-          [&](size_t i) { return items_[i] >> shift & ((1u << kDigitBits) - 1); },
-          [&](size_t i, size_t place) { moved_[place] = items_[i]; });
+          static_cast<size_t>(num_chunks(size, kGrain)), size_t{1} << kDigitBits,
+          [&](const auto& visit) {
+            parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+              visit(static_cast<size_t>(begin / kGrain),
+                    std::span(items_).subspan(static_cast<size_t>(begin),
+                                              static_cast<size_t>(end - begin)));
+            });
+          },
+          [&](Item item) { return item >> shift & ((1u << kDigitBits) - 1); },
+          [&](Item item, size_t, size_t, size_t place) { moved_[place] = item; });
       items_.swap(moved_);
     }
   }
@@ -263,19 +292,6 @@ class RangeSorter {
   std::vector<IndexedPoint> copy_;
 };
 
-void check_positions(std::span<const Eigen::Vector3f> positions) {
-  check(positions.size() <= std::numeric_limits<int32_t>::max(), "hilbert_order: < 2^31 points");
-  parallel_for(static_cast<int64_t>(positions.size()), kGrain, [&](int64_t begin, int64_t end) {
-    bool valid = true;
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      for (int axis = 0; axis < 3; ++axis) {
-        valid &= std::abs(positions[i][axis]) < 1e18f;  // false for NaN
-      }
-    }
-    check(valid, "hilbert_order: finite positions below 1e18");
-  });
-}
-
 }  // namespace
 
 uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z) {
@@ -283,21 +299,20 @@ uint32_t hilbert_key(uint32_t x, uint32_t y, uint32_t z) {
   return key_of_cell<kDoubleStepsOfKey>(x, y, z);
 }
 
-void hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run,
-                   std::span<IndexedPoint> ordered) {
+void hilbert_order(const PointSource& points, int64_t max_run, std::span<IndexedPoint> ordered) {
   check(max_run >= 1, "hilbert_order: max_run >= 1");
-  check(ordered.size() == positions.size(), "hilbert_order: room for every point");
-  check_positions(positions);
-  if (positions.empty()) return;
-  CellGrid grid(bounds_of_most(positions));
-  if (!grid.is_divisible()) grid = CellGrid(bounds_of(positions));
+  check(points.size() <= std::numeric_limits<int32_t>::max(), "hilbert_order: < 2^31 points");
+  check(ordered.size() == points.size(), "hilbert_order: room for every point");
+  if (ordered.empty()) return;
+  const Survey survey(points);
+  CellGrid grid(survey.of_most());
+  if (!grid.is_divisible()) grid = CellGrid(survey.all);
   const bool all_in_one_place = !grid.is_divisible();
   const std::vector<uint32_t> starts = distribute(
-      positions.size(), kBuckets,
-      [&](size_t i) { return all_in_one_place ? 0 : grid.bucket(array_of(positions[i])); },
-      [&](size_t i, size_t place) {
-        const Eigen::Vector3f& x = positions[i];
-        ordered[place] = {x.x(), x.y(), x.z(), static_cast<uint32_t>(i)};
+      points.num_chunks(), kBuckets, [&](const auto& visit) { points.for_each_chunk(visit); },
+      [&](const Eigen::Vector3f& x) { return all_in_one_place ? 0 : grid.bucket(x.array()); },
+      [&](const Eigen::Vector3f& x, size_t chunk, size_t i, size_t place) {
+        ordered[place] = {x.x(), x.y(), x.z(), static_cast<uint32_t>(points.starts()[chunk] + i)};
       });
   if (all_in_one_place) return;
   constexpr int kRestOfKey = 6 * (kDoubleStepsOfKey - kDoubleStepsOfBucket);

@@ -3,9 +3,10 @@
 // Curve as in C. Hamilton, "Compact Hilbert Indices", Dalhousie University CS-2006-07, section 2.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <span>
+
+#include "vggtcd/geometry/point_source.h"
 
 namespace vggtcd {
 
@@ -26,7 +27,6 @@ struct IndexedPoint {
 // rest. Points that this does not tell apart are in ascending order of index. The same on any
 // number of threads. Positions are finite and below 1e18, else Error{kInternal}; at most 2^31 - 1
 // of them. Needs little memory of its own, unless most of the points lie in a few of the cells.
-void hilbert_order(std::span<const Eigen::Vector3f> positions, int64_t max_run,
-                   std::span<IndexedPoint> ordered);
+void hilbert_order(const PointSource& points, int64_t max_run, std::span<IndexedPoint> ordered);
 
 }  // namespace vggtcd

@@ -61,7 +61,7 @@ Points random_points(size_t count, unsigned seed) {
 
 std::vector<uint32_t> order_of(const Points& points, int64_t max_run) {
   std::vector<IndexedPoint> ordered(points.size());
-  hilbert_order(points, max_run, ordered);
+  hilbert_order(PointArray(points), max_run, ordered);
   std::vector<uint32_t> indices;
   for (const IndexedPoint& p : ordered) {
     EXPECT_EQ(points[p.index], Eigen::Vector3f(p.x, p.y, p.z));

@@ -25,7 +25,7 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 using PointsOfBlock = std::array<IndexedPoint, kLanes>;
 static_assert(sizeof(PointsOfBlock) == sizeof(PointBlock));
 
-LargeArray<PointBlock> make_blocks(std::span<const Eigen::Vector3f> points) {
+LargeArray<PointBlock> make_blocks(const PointSource& points) {
   LargeArray<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
   if (blocks.empty()) return blocks;
   // One array serves both: at full size the points are the largest thing in memory.
@@ -125,8 +125,7 @@ struct NearestNeighborIndex::Impl {
   LargeArray<PointBlock> blocks;
   std::vector<LargeArray<BoxNode>> levels;
 
-  explicit Impl(std::span<const Eigen::Vector3f> targets)
-      : size(targets.size()), blocks(make_blocks(targets)) {
+  explicit Impl(const PointSource& targets) : size(targets.size()), blocks(make_blocks(targets)) {
     if (blocks.empty()) return;
     levels.push_back(make_level(blocks));
     while (levels.back().size() > 1) levels.push_back(make_level(levels.back()));
@@ -156,6 +155,8 @@ struct NearestNeighborIndex::Impl {
 };
 
 NearestNeighborIndex::NearestNeighborIndex(std::span<const Eigen::Vector3f> targets)
+    : NearestNeighborIndex(PointArray(targets)) {}
+NearestNeighborIndex::NearestNeighborIndex(const PointSource& targets)
     : impl_(std::make_unique<const Impl>(targets)) {}
 NearestNeighborIndex::~NearestNeighborIndex() = default;
 NearestNeighborIndex::NearestNeighborIndex(NearestNeighborIndex&&) noexcept = default;
@@ -166,7 +167,7 @@ size_t NearestNeighborIndex::size() const { return impl_->size; }
 void NearestNeighborIndex::query(std::span<const Eigen::Vector3f> queries, float bound,
                                  std::span<float> distance, std::span<int32_t> index) const {
   check(distance.size() == queries.size(), "nearest neighbors: one distance per query");
-  impl_->query(make_blocks(queries), bound, distance, index);
+  impl_->query(make_blocks(PointArray(queries)), bound, distance, index);
 }
 
 void NearestNeighborIndex::query(const NearestNeighborIndex& queries, float bound,

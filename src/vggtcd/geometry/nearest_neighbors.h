@@ -10,6 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "vggtcd/geometry/point_source.h"
+
 namespace vggtcd {
 
 // One entry per query, in the order of the queries. Where no target lies within the bound, index is
@@ -34,6 +36,7 @@ class NearestNeighborIndex {
 
   // Copies the targets: about 18 bytes each, hardly more while building.
   explicit NearestNeighborIndex(std::span<const Eigen::Vector3f> targets);
+  explicit NearestNeighborIndex(const PointSource& targets);
   ~NearestNeighborIndex();
   NearestNeighborIndex(NearestNeighborIndex&&) noexcept;
   NearestNeighborIndex& operator=(NearestNeighborIndex&&) noexcept;

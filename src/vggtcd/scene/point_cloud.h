@@ -4,8 +4,11 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "vggtcd/core/large_array.h"
+#include "vggtcd/geometry/point_source.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
 
@@ -49,9 +52,38 @@ inline bool is_confident(const Reconstruction& reconstruction, size_t pixel, flo
 PointCloud unproject(const Reconstruction& reconstruction, float min_confidence,
                      const Sim3& out_from_world = {});
 
-// Their positions alone: half of the memory.
-LargeArray<Eigen::Vector3f> unproject_positions(const Reconstruction& reconstruction,
-                                                float min_confidence,
-                                                const Sim3& out_from_world = {});
+// Their positions alone, made frame by frame when they are asked for. Refers to the reconstruction.
+class ConfidentPoints : public PointSource {
+ public:
+  ConfidentPoints(const Reconstruction& reconstruction, float min_confidence,
+                  const Sim3& out_from_world = {});
+  std::span<const size_t> starts() const override { return starts_; }
+  std::span<const Eigen::Vector3f> chunk(size_t frame,
+                                         std::vector<Eigen::Vector3f>& memory) const override;
+
+  // Calls take(number of the point, pixel, position) for the points of a frame.
+  template <typename Take>
+  void for_each_point(size_t frame, const Take& take) const;
+
+ private:
+  bool keep(size_t pixel) const { return is_confident(reconstruction_, pixel, min_confidence_); }
+
+  const Reconstruction& reconstruction_;
+  float min_confidence_;
+  Sim3 out_from_world_;
+  std::vector<size_t> starts_;
+};
+
+template <typename Take>
+void ConfidentPoints::for_each_point(size_t frame, const Take& take) const {
+  const PixelRays rays(reconstruction_.views[frame], out_from_world_);
+  size_t pixel = frame * reconstruction_.pixels_per_frame();
+  size_t i = starts_[frame];
+  for (int v = 0; v < reconstruction_.height; ++v) {
+    for (int u = 0; u < reconstruction_.width; ++u, ++pixel) {
+      if (keep(pixel)) take(i++, pixel, rays.point(u, v, reconstruction_.depth[pixel]));
+    }
+  }
+}
 
 }  // namespace vggtcd

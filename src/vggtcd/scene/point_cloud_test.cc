@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vggtcd/scene/point_cloud.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
@@ -57,7 +58,11 @@ TEST(Unproject, DropsPixelsWithoutDepthAndAtOrBelowTheConfidence) {
   ASSERT_EQ(cloud.size(), 9u);
   EXPECT_EQ(cloud.pixels[3], 4u);
   EXPECT_EQ(cloud.pixels[8], 9u);
-  EXPECT_TRUE(std::ranges::equal(unproject_positions(r, 90.0f), cloud.positions));
+  const ConfidentPoints points(r, 90.0f);
+  std::vector<Eigen::Vector3f> memory;
+  ASSERT_THAT(points.starts(), testing::ElementsAre(0, 9, 9));
+  EXPECT_TRUE(std::ranges::equal(points.chunk(0, memory), cloud.positions));
+  EXPECT_TRUE(points.chunk(1, memory).empty());
 }
 
 TEST(CheckConsistent, RefusesAMissingArray) {
