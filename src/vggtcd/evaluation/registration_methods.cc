@@ -19,9 +19,10 @@ Sim3 align_as_paper(const RegistrationProblem& problem) {
 }
 
 Sim3 align_robustly(const RegistrationProblem& problem) {
-  const Sim3 coarse = align_coarse_only(problem);
-  const FineResult fine = align_fine(problem.before, problem.after, coarse, {});
-  return choose_alignment(problem.before, problem.after, {"coarse", coarse, 0}, fine, {})
+  const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
+  const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
+  return choose_alignment(problem.before, problem.after, {"coarse", coarse.t2_from_t1, 0},
+                          coarse_uncertainty(coarse), fine, {})
       .t2_from_t1;
 }
 

@@ -54,9 +54,11 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
   }
   if (options.method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
+      std::optional<InitialUncertainty> uncertainty;
+      if (result.coarse) uncertainty = coarse_uncertainty(*result.coarse);
       AlignmentChoice choice =
           choose_alignment(before, after, {result.chosen, result.initial_t2_from_t1, 0},
-                           *result.fine, options.robust);
+                           uncertainty, *result.fine, options.robust);
       result.t2_from_t1 = choice.t2_from_t1;
       result.chosen = std::move(choice.chosen);
       result.verdict = std::move(choice.verdict);

@@ -9,12 +9,13 @@
 namespace vggtcd {
 
 AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruction& after,
-                                 const AlignmentCandidate& initial, const FineResult& fine,
-                                 const RobustOptions& options) {
+                                 const AlignmentCandidate& initial,
+                                 const std::optional<InitialUncertainty>& initial_uncertainty,
+                                 const FineResult& fine, const RobustOptions& options) {
   const OrientedPoints t1 = oriented_points(before, options.robust_grid_resolution);
   const OrientedPoints t2 = oriented_points(after, options.robust_grid_resolution);
   AlignmentChoice choice;
-  choice.robust = align_robust(t1, t2, initial.t2_from_t1, options);
+  choice.robust = align_robust(t1, t2, initial.t2_from_t1, initial_uncertainty, options);
   choice.t2_from_t1 = initial.t2_from_t1;
   choice.chosen = initial.name;
   choice.verdict = enum_to_string(choice.robust.verdict);

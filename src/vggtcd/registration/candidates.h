@@ -3,6 +3,7 @@
 // of both best (method robust).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,8 +31,10 @@ struct AlignmentChoice {
 
 // Refines all seven parameters from `initial` (its name is what it is called in the result) and
 // takes the candidate that fits best: `initial`, the fine stage's or the robust refinement's.
+// `initial_uncertainty` is the coarse stage's (coarse_uncertainty), if it ran.
 AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruction& after,
-                                 const AlignmentCandidate& initial, const FineResult& fine,
-                                 const RobustOptions& options);
+                                 const AlignmentCandidate& initial,
+                                 const std::optional<InitialUncertainty>& initial_uncertainty,
+                                 const FineResult& fine, const RobustOptions& options);
 
 }  // namespace vggtcd

@@ -2,6 +2,7 @@
 // Coarse registration through the joint pass over keyframes (section 3.2 of the paper).
 #include "vggtcd/registration/coarse.h"
 
+#include <span>
 #include <vector>
 
 #include "vggtcd/core/splitmix64.h"
@@ -106,6 +107,14 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
   result.candidates = static_cast<int64_t>(candidates.size());
   result.correspondences = static_cast<int64_t>(pairs.size());
   result.rms_residual_u = fit.rms;
+  for (Eigen::Vector3d& x : in_epoch) x = fit.y_from_x * x;
+  // Pairs are in the order of the keyframes.
+  for (size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {
+    const size_t frame = pairs[begin].in_joint / joint.pixels_per_frame();
+    while (end < pairs.size() && pairs[end].in_joint / joint.pixels_per_frame() == frame) ++end;
+    result.keyframes.push_back(keyframe_witness(std::span(in_epoch).subspan(begin, end - begin),
+                                                std::span(in_joint).subspan(begin, end - begin)));
+  }
   return result;
 }
 
@@ -116,6 +125,10 @@ Sim3 compose_through_joint(const Sim3& joint_from_t1, const Sim3& joint_from_t2)
                                       (joint_from_t1.translation - joint_from_t2.translation) /
                                       joint_from_t2.scale;
   return {scale, rotation, translation};
+}
+
+InitialUncertainty coarse_uncertainty(const CoarseResult& coarse) {
+  return coarse_uncertainty(coarse.t1.keyframes, coarse.t2.keyframes, coarse.t2.joint_from_epoch);
 }
 
 CoarseResult align_coarse(const Reconstruction& before, const Reconstruction& after,

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
+#include "vggtcd/registration/initial_uncertainty.h"
 #include "vggtcd/scene/reconstruction.h"
 
 namespace vggtcd {
@@ -25,9 +27,10 @@ struct CoarseOptions {
 // One epoch against the joint pass.
 struct EpochToJoint {
   Sim3 joint_from_epoch;
-  int64_t candidates = 0;       // pixel pairs above the confidence median
-  int64_t correspondences = 0;  // of them used, at most M
-  double rms_residual_u = 0;    // of the used pairs, in joint units
+  int64_t candidates = 0;                  // pixel pairs above the confidence median
+  int64_t correspondences = 0;             // of them used, at most M
+  double rms_residual_u = 0;               // of the used pairs, in joint units
+  std::vector<KeyframeWitness> keyframes;  // of the used pairs, in the joint frame
 };
 
 struct CoarseResult {
@@ -47,6 +50,9 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
 
 // Eq. 3: s = s1 / s2, R = R2^T R1, t = R2^T (t1 - t2) / s2.
 Sim3 compose_through_joint(const Sim3& joint_from_t1, const Sim3& joint_from_t2);
+
+// How far the result and each photo may be off, from the spread of the keyframes.
+InitialUncertainty coarse_uncertainty(const CoarseResult& coarse);
 
 // The whole stage: both epochs to the joint frame, composed.
 CoarseResult align_coarse(const Reconstruction& before, const Reconstruction& after,

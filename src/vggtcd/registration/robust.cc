@@ -10,30 +10,18 @@
 
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
+#include "vggtcd/registration/frame_equations.h"
 #include "vggtcd/registration/surface_pairs.h"
 
 namespace vggtcd {
 namespace {
 
-constexpr double kSigmaFromMad = 1.4826;  // of a normal distribution
-constexpr double kTukeyTuning = 4.685;    // 95 % efficiency under a normal distribution
-constexpr double kConvergedStep = 1e-6;   // rad, log scale, share of the extent
+// A step this small in standard deviations of the result ends the iteration.
+constexpr double kConvergedStep = 0.1;
 constexpr double kWeakShare = 0.5;
 // Residuals are never believed to be smaller than this share of the extent: on data without noise
 // the rounding of float positions would otherwise count as information.
 constexpr double kSigmaFloor = 1e-4;
-
-double tukey_weight(double residual, double sigma) {
-  const double x = residual / (kTukeyTuning * sigma);
-  return x * x < 1 ? (1 - x * x) * (1 - x * x) : 0;
-}
-
-// Tukey's loss scaled to end at 1.
-double tukey_loss(double residual, double sigma) {
-  const double x = residual / (kTukeyTuning * sigma);
-  const double rest = 1 - x * x;
-  return x * x < 1 ? 1 - rest * rest * rest : 1;
-}
 
 double median_of(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
   std::vector<float> values;
@@ -65,48 +53,6 @@ StaticPairs static_pairs(const std::vector<SurfacePair>& all, const RobustOption
   return result;
 }
 
-// The normal equations of one linearisation, in information units (divided by sigma^2), and the
-// scatter of the clusters' gradients.
-struct NormalEquations {
-  Matrix7 hessian = Matrix7::Zero();
-  Vector7 gradient = Vector7::Zero();
-  Matrix7 cluster_scatter = Matrix7::Zero();
-  double sigma = 0;
-
-  // How many pairs of one cluster say what one would: trace(H^-1 S) / 7 against independent
-  // residuals.
-  double design_effect() const {
-    // Directions without information have no scatter either; the ridge keeps the solve defined.
-    const Matrix7 ridge = 1e-9 * hessian.diagonal().maxCoeff() * Matrix7::Identity();
-    return std::max(1.0, (hessian + ridge).ldlt().solve(cluster_scatter).trace() / 7.0);
-  }
-};
-
-NormalEquations linearise(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
-                          double min_sigma, int32_t num_clusters) {
-  NormalEquations result;
-  const double mad =
-      median_of(pairs, [](const SurfacePair& pair) { return std::abs(pair.plane_residual()); });
-  result.sigma = std::max(min_sigma, kSigmaFromMad * mad);
-  const double information = 1 / (result.sigma * result.sigma);
-  std::vector<Vector7> cluster_gradient(static_cast<size_t>(num_clusters), Vector7::Zero());
-  for (const SurfacePair& pair : pairs) {
-    const double residual = pair.plane_residual();
-    const double weight = information * tukey_weight(residual, result.sigma);
-    if (weight == 0) continue;
-    const Eigen::Vector3d arm = pair.moving - pivot;
-    Vector7 jacobian;
-    jacobian << arm.cross(pair.normal), pair.normal, pair.normal.dot(arm);
-    result.hessian += weight * jacobian * jacobian.transpose();
-    cluster_gradient[static_cast<size_t>(pair.cluster)] += weight * residual * jacobian;
-  }
-  for (const Vector7& gradient : cluster_gradient) {
-    result.gradient += gradient;
-    result.cluster_scatter += gradient * gradient.transpose();
-  }
-  return result;
-}
-
 std::string describe_direction(const Vector7& direction) {
   // The parameters are in units of their prior, so that their sizes compare.
   const double rotation = direction.segment<3>(0).norm();
@@ -128,19 +74,24 @@ std::string describe_direction(const Vector7& direction) {
   return fmt::format("{}", fmt::join(parts, " with "));
 }
 
-// Uncertainty and constraint of the solution from its information matrix and the prior's.
-void report_uncertainty(const Matrix7& data_information, const Vector7& prior_sigma,
+// Covariance of the solution, and what of it the surfaces contribute: in coordinates in which the
+// prior is the identity, the variances left.
+void report_uncertainty(const Matrix7& surface_information, const Matrix7& prior_covariance,
                         RobustResult& result) {
-  const Matrix7 prior_information = prior_sigma.cwiseInverse().cwiseAbs2().asDiagonal();
-  result.covariance = (data_information + prior_information).inverse();
-  const Matrix7 to_prior_units = prior_sigma.cwiseInverse().asDiagonal();
-  const Matrix7 relative =
-      to_prior_units * result.covariance * to_prior_units;  // identity: prior alone
-  result.constrained_share = (Vector7::Ones() - relative.diagonal()).cwiseMax(0.0).cwiseMin(1.0);
-  const Eigen::SelfAdjointEigenSolver<Matrix7> eigen(relative);
+  result.covariance = (surface_information + Matrix7(prior_covariance.inverse())).inverse();
+  result.constrained_share =
+      (Vector7::Ones() - result.covariance.diagonal().cwiseQuotient(prior_covariance.diagonal()))
+          .cwiseMax(0.0)
+          .cwiseMin(1.0);
+  const Vector7 sigma = prior_covariance.diagonal().cwiseSqrt();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix7> eigen(result.covariance,
+                                                                prior_covariance);
   for (int i = 6; i >= 0; --i) {
     if (1 - eigen.eigenvalues()[i] < kWeakShare) {
-      result.weak_directions.push_back(describe_direction(eigen.eigenvectors().col(i)));
+      // A direction of the dual space; the motion it stands for is the prior's answer to it.
+      const Vector7 motion = prior_covariance * eigen.eigenvectors().col(i);
+      result.weak_directions.push_back(
+          describe_direction(motion.cwiseQuotient(sigma).normalized()));
     }
   }
 }
@@ -176,32 +127,34 @@ void RobustOptions::validate() const {
   check_field(min_normal_cosine >= 0 && min_normal_cosine < 1, "min_normal_cosine",
               min_normal_cosine, "a number in [0, 1)");
   check_field(prior_sigma > 0, "prior_sigma", prior_sigma, "a positive number");
+  check_field(frame_sigma > 0, "frame_sigma", frame_sigma, "a positive number");
   check_field(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
   check_field(min_pairs >= 7, "min_pairs", min_pairs, "at least 7");
 }
 
-Sim3 small_similarity(const Vector7& parameters, const Eigen::Vector3d& pivot) {
-  const Eigen::Vector3d rotation_vector = parameters.segment<3>(0);
-  const double angle = rotation_vector.norm();
-  Sim3 result;
-  result.scale = std::exp(parameters[6]);
-  if (angle > 0) {
-    result.rotation = Eigen::AngleAxisd(angle, rotation_vector / angle).toRotationMatrix();
-  }
-  result.translation = pivot + parameters.segment<3>(3) - result.scale * (result.rotation * pivot);
+namespace {
+
+InitialUncertainty assumed_uncertainty(const RobustOptions& options, double extent_u,
+                                       const Eigen::Vector3d& pivot) {
+  const double prior = options.prior_sigma, frame = options.frame_sigma;
+  InitialUncertainty result;
+  result.similarity = {FrameSpread{prior, prior * extent_u, prior}.covariance(), pivot};
+  result.frame = {frame, frame * extent_u, frame};
   return result;
 }
 
-Vector7 similarity_parameters(const Sim3& similarity, const Eigen::Vector3d& pivot) {
-  const Eigen::AngleAxisd rotation(similarity.rotation);
-  Vector7 parameters;
-  parameters << rotation.angle() * rotation.axis(), similarity * pivot - pivot,
-      std::log(similarity.scale);
-  return parameters;
+Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3f>& points) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3f& x : points) sum += x.cast<double>();
+  return sum / static_cast<double>(points.size());
 }
 
+}  // namespace
+
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
-                          const Sim3& initial_t2_from_t1, const RobustOptions& options) {
+                          const Sim3& initial_t2_from_t1,
+                          const std::optional<InitialUncertainty>& measured,
+                          const RobustOptions& options) {
   options.validate();
   RobustResult result;
   result.t2_from_t1 = initial_t2_from_t1;
@@ -213,18 +166,23 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
         t2.size());
     return result;
   }
-  for (const Eigen::Vector3f& x : t2.positions) result.pivot_in_t2 += x.cast<double>();
-  result.pivot_in_t2 /= static_cast<double>(t2.size());
+  result.pivot_in_t2 = mean_of(t2.positions);
   result.extent_u = robust_extent(t2.positions);
-  Vector7 prior_sigma = Vector7::Constant(options.prior_sigma);
-  prior_sigma.segment<3>(3) *= result.extent_u;
-  const Vector7 prior_information = prior_sigma.cwiseInverse().cwiseAbs2();
+  result.uncertainty_measured =
+      measured && options.measured_uncertainty && measured->similarity.covariance.trace() > 0;
+  result.uncertainty = result.uncertainty_measured
+                           ? *measured
+                           : assumed_uncertainty(options, result.extent_u, result.pivot_in_t2);
+  const Matrix7 prior_covariance = result.uncertainty.similarity.about(result.pivot_in_t2);
+  const Matrix7 prior_information = prior_covariance.inverse();
 
   const SurfaceMatcher matcher(t1, t2);
   Sim3 current = initial_t2_from_t1;
-  Matrix7 data_information = Matrix7::Zero();
-  for (result.iterations = 1; result.iterations <= options.max_iterations; ++result.iterations) {
-    const StaticPairs gated = static_pairs(matcher.pairs(current), options);
+  Matrix7 surface_information = Matrix7::Zero();
+  while (!result.converged && result.iterations < options.max_iterations) {
+    ++result.iterations;
+    const StaticPairs gated =
+        static_pairs(matcher.pairs(current, options.both_directions), options);
     result.pairs = static_cast<int64_t>(gated.pairs.size());
     result.rejected_far = gated.rejected_far;
     result.rejected_normal = gated.rejected_normal;
@@ -235,28 +193,22 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
           result.pairs, options.min_pairs);
       return result;
     }
-    const NormalEquations equations = linearise(
-        gated.pairs, result.pivot_in_t2, kSigmaFloor * result.extent_u, matcher.num_clusters());
-    const double design_effect = equations.design_effect();
-    result.residual_sigma_u = equations.sigma;
-    result.effective_pairs = static_cast<double>(result.pairs) / design_effect;
-    data_information = equations.hessian / design_effect;
+    const SurfaceEquations surface = surface_equations(
+        gated.pairs, result.pivot_in_t2, options.frame_errors ? &result.uncertainty.frame : nullptr,
+        kSigmaFloor * result.extent_u);
+    result.residual_sigma_u = surface.sigma_u;
+    surface_information = surface.information;
 
-    // Minimise data + prior: the prior's residual is what separates the current from the initial
-    // similarity.
+    // The prior's residual is what separates the current from the initial similarity.
     const Vector7 from_initial =
         similarity_parameters(current * initial_t2_from_t1.inverse(), result.pivot_in_t2);
-    const Matrix7 information = data_information + Matrix7(prior_information.asDiagonal());
-    const Vector7 slope =
-        equations.gradient / design_effect + prior_information.cwiseProduct(from_initial);
+    const Matrix7 information = surface.information + prior_information;
+    const Vector7 slope = surface.gradient + prior_information * from_initial;
     const Vector7 step = -information.ldlt().solve(slope);
     current = small_similarity(step, result.pivot_in_t2) * current;
-    Vector7 relative_step = step;
-    relative_step.segment<3>(3) /= result.extent_u;
-    if (relative_step.norm() < kConvergedStep) break;
+    result.converged = step.dot(information * step) < kConvergedStep * kConvergedStep;
   }
-  result.iterations = std::min(result.iterations, options.max_iterations);
-  report_uncertainty(data_information, prior_sigma, result);
+  report_uncertainty(surface_information, prior_covariance, result);
 
   result.cost_initial = cost_of(matcher.pairs(initial_t2_from_t1), result.residual_sigma_u,
                                 options.min_normal_cosine);
@@ -266,8 +218,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     result.verdict = RobustVerdict::kKeptInitialNotBetter;
     result.explanation = fmt::format(
         "Kept the initial alignment: the refined one does not fit the static surfaces better (cost "
-        "{:.4g} "
-        "before, {:.4g} after).",
+        "{:.4g} before, {:.4g} after).",
         result.cost_initial, result.cost_final);
     return result;
   }

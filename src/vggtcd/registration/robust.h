@@ -4,15 +4,16 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
+#include "vggtcd/registration/initial_uncertainty.h"
+#include "vggtcd/registration/small_similarity.h"
 #include "vggtcd/scene/oriented_points.h"
 
 namespace vggtcd {
@@ -21,10 +22,14 @@ struct RobustOptions {
   int robust_grid_resolution = 200;  // voxels along the largest axis of a cloud; >= 1
   double static_distance = 3.0;      // gate on the pair distance, in medians of it; > 0
   double min_normal_cosine = 0.8;    // gate on the normals of a pair, in [0, 1)
-  double prior_sigma =
-      0.02;  // of the initial similarity: rotation (rad), log scale, translation / extent
-  int max_iterations = 40;  // >= 1
-  int64_t min_pairs = 200;  // fewer gated pairs keep the initial similarity; >= 7
+  bool both_directions = true;       // also search from T2 to T1
+  bool measured_uncertainty = true;  // of the initial similarity and of a photo, from the keyframes
+  bool frame_errors = true;          // a photo errs as a whole; false: points are independent
+  // Where nothing is measured: rotation (rad), log scale, translation / extent.
+  double prior_sigma = 0.02;   // of the initial similarity; > 0
+  double frame_sigma = 0.002;  // of one photo; > 0
+  int max_iterations = 30;     // >= 1
+  int64_t min_pairs = 200;     // fewer gated pairs keep the initial similarity; >= 7
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("robust_grid_resolution", self.robust_grid_resolution,
@@ -33,29 +38,26 @@ struct RobustOptions {
           "Robust: pairs farther apart than this many medians are taken for change.");
     field("min_normal_cosine", self.min_normal_cosine,
           "Robust: pairs whose surface normals disagree more than this are left out.");
-    field("prior_sigma", self.prior_sigma,
-          "Robust: how far the initial similarity is trusted: standard deviation of its rotation "
-          "(rad), its "
-          "log scale, and its translation as a share of the scene extent.");
+    field("both_directions", self.both_directions,
+          "Robust: pairs from T1 to T2 and from T2 to T1, not only the former.");
+    field("measured_uncertainty", self.measured_uncertainty,
+          "Robust: how far the initial alignment and each photo may be off is measured on the "
+          "keyframes of the joint pass; else, and without a joint pass, it is assumed.");
+    field(
+        "frame_errors", self.frame_errors,
+        "Robust: a photo's points may be misplaced, tilted and scaled as a whole; else all points "
+        "are taken for independent.");
+    field(
+        "prior_sigma", self.prior_sigma,
+        "Robust: assumed standard deviation of the initial alignment's rotation (rad), log scale, "
+        "and translation as a share of the scene extent, where nothing is measured.");
+    field("frame_sigma", self.frame_sigma, "Robust: the same of one photo's points.");
     field("max_iterations", self.max_iterations, "Robust: Gauss-Newton iterations at most.");
     field("min_pairs", self.min_pairs,
           "Robust: with fewer static pairs the initial alignment is kept.");
   };
   void validate() const;
 };
-
-// A small similarity about a pivot, in the T2 frame: x -> pivot + exp(s) Exp(w) (x - pivot) + t.
-// Order of the seven: w (rad, 3), t (T2 units, 3), s.
-using Vector7 = Eigen::Matrix<double, 7, 1>;
-using Matrix7 = Eigen::Matrix<double, 7, 7>;
-
-inline constexpr std::array<std::string_view, 7> kDegreesOfFreedom = {
-    "rotation_x",    "rotation_y",    "rotation_z", "translation_x",
-    "translation_y", "translation_z", "scale"};
-
-Sim3 small_similarity(const Vector7& parameters, const Eigen::Vector3d& pivot);
-// Its inverse: the parameters of a similarity about the pivot (rotation below pi).
-Vector7 similarity_parameters(const Sim3& similarity, const Eigen::Vector3d& pivot);
 
 enum class RobustVerdict {
   kRefined,
@@ -71,12 +73,12 @@ struct RobustResult {
 
   Eigen::Vector3d pivot_in_t2 = Eigen::Vector3d::Zero();
   double extent_u = 0;  // robust extent of T2's points
-  // Of the seven parameters about the pivot. Errors of a network are common to a whole frame, so
-  // the pairs of one frame count as one witness (cluster-robust), not as thousands.
+  // Of the seven parameters about the pivot, from the surfaces and the initial uncertainty. It is
+  // that of the surfaces: where a pass bends its world, cameras may be off by more.
   Matrix7 covariance = Matrix7::Zero();
   // Per degree of freedom, 0 to 1: the share of what is known about it that comes from the static
-  // surfaces (the rest is the initial similarity). A plane leaves two translations, a rotation and
-  // the scale near 0.
+  // surfaces (the rest is the initial similarity): one minus the ratio of variances. A plane leaves
+  // two translations, a rotation and the scale near 0.
   Vector7 constrained_share = Vector7::Zero();
   std::vector<std::string> weak_directions;  // in words, for shares below 0.5 in any combination
 
@@ -84,15 +86,21 @@ struct RobustResult {
   int64_t pairs = 0;  // static pairs in the last iteration, both directions
   int64_t points_t1 = 0, points_t2 = 0;
   int64_t rejected_far = 0, rejected_normal = 0;
-  double residual_sigma_u = 0;  // robust standard deviation of the point-to-plane residuals
-  double effective_pairs = 0;   // pairs / design effect of the clusters
+  double residual_sigma_u = 0;     // robust standard deviation of the point-to-plane residuals
+  InitialUncertainty uncertainty;  // what was assumed or measured beforehand
+  bool uncertainty_measured = false;
+  bool converged = false;  // the last step was below a tenth of a standard deviation
   double cost_initial = 0, cost_final = 0;  // surface_cost with the final scale
 };
 
-// Gauss-Newton on r = n . (T x - y) over the nearest pairs in both directions, Tukey weights, gates
-// on distance and normals, prior on T T0^-1.
+// Gauss-Newton on r = n . (T x - y) over the nearest pairs, Tukey weights, gates on distance and
+// normals, photos that may err as a whole (frame_equations.h), and the initial similarity with its
+// uncertainty as prior: the maximum a posteriori. `measured` is what the coarse stage knows about
+// itself (coarse_uncertainty); without it prior_sigma and frame_sigma stand in.
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
-                          const Sim3& initial_t2_from_t1, const RobustOptions& options);
+                          const Sim3& initial_t2_from_t1,
+                          const std::optional<InitialUncertainty>& measured,
+                          const RobustOptions& options);
 
 // What candidates are compared by: the mean over both directions of the Tukey loss (0 to 1) of the
 // point-to-plane distance at scale sigma_u; points without a compatible partner count 1.

@@ -20,7 +20,9 @@ struct SurfacePair {
   Eigen::Vector3d normal;    // of the target surface
   double distance = 0;       // between the points
   double normal_cosine = 0;  // |cos| between the two surfaces' normals
-  int32_t cluster = 0;       // the frame of the searching point; T2's frames follow T1's
+  int32_t frame_t1 = 0;      // the photos the two points were taken from
+  int32_t frame_t2 = 0;
+  bool from_t1 = true;  // the searching point is T1's
 
   double plane_residual() const { return normal.dot(moving - fixed); }
 };
@@ -30,17 +32,14 @@ class SurfaceMatcher {
   // The clouds must outlive the matcher.
   SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2);
 
-  // One pair per point of T1, then one per point of T2.
-  std::vector<SurfacePair> pairs(const Sim3& t2_from_t1) const;
-  int32_t num_clusters() const { return num_clusters_; }
+  // One pair per point of T1, then, with `both`, one per point of T2.
+  std::vector<SurfacePair> pairs(const Sim3& t2_from_t1, bool both = true) const;
 
  private:
   const OrientedPoints& t1_;
   const OrientedPoints& t2_;
   NearestNeighborIndex index_t1_;  // in T1's own frame: it does not move
   NearestNeighborIndex index_t2_;
-  int32_t first_t2_cluster_ = 0;
-  int32_t num_clusters_ = 0;
 };
 
 }  // namespace vggtcd

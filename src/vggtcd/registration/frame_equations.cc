@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// Normal equations of surface pairs whose errors are common to whole photos.
+#include "vggtcd/registration/frame_equations.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "vggtcd/geometry/order_statistics.h"
+
+namespace vggtcd {
+namespace {
+
+constexpr double kSigmaFromMad = 1.4826;  // of a normal distribution
+constexpr double kTukeyTuning = 4.685;    // 95 % efficiency under a normal distribution
+constexpr double kPairShare = 0.5;        // found from both sides
+// Photos next to each other in the list err alike anyway; this bounds the linear system.
+constexpr int kMaxWitnesses = 48;
+
+double residual_sigma(const std::vector<SurfacePair>& pairs, double min_sigma_u) {
+  std::vector<float> residuals;
+  residuals.reserve(pairs.size());
+  for (const SurfacePair& pair : pairs) {
+    residuals.push_back(static_cast<float>(std::abs(pair.plane_residual())));
+  }
+  if (residuals.empty()) return min_sigma_u;
+  return std::max(min_sigma_u, kSigmaFromMad * static_cast<double>(median(residuals)));
+}
+
+// One side's photos, gathered into at most kMaxWitnesses groups of neighbours.
+class Witnesses {
+ public:
+  Witnesses(const std::vector<SurfacePair>& pairs, int32_t SurfacePair::*frame,
+            Eigen::Vector3d SurfacePair::*point) {
+    for (const SurfacePair& pair : pairs) frames_ = std::max(frames_, pair.*frame + 1);
+    centers_.resize(static_cast<size_t>(count()), Eigen::Vector3d::Zero());
+    std::vector<double> sizes(centers_.size(), 0);
+    for (const SurfacePair& pair : pairs) {
+      const size_t witness = static_cast<size_t>(of(pair.*frame));
+      centers_[witness] += pair.*point;
+      ++sizes[witness];
+    }
+    for (size_t k = 0; k < centers_.size(); ++k) centers_[k] /= std::max(1.0, sizes[k]);
+  }
+  int count() const { return std::min(frames_, kMaxWitnesses); }
+  int of(int32_t frame) const {
+    return frames_ <= kMaxWitnesses ? frame
+                                    : static_cast<int>(int64_t{frame} * kMaxWitnesses / frames_);
+  }
+  const Eigen::Vector3d& center(int witness) const {
+    return centers_[static_cast<size_t>(witness)];
+  }
+
+ private:
+  int32_t frames_ = 0;
+  std::vector<Eigen::Vector3d> centers_;
+};
+
+struct Block {
+  Matrix7 information = Matrix7::Zero();
+  Vector7 gradient = Vector7::Zero();
+};
+
+Eigen::Index at(int block) { return 7 * Eigen::Index{block}; }
+
+// Unknowns: theta, the photos of T1, the photos of T2; all but theta are eliminated.
+SurfaceEquations marginalise(const std::map<std::pair<int, int>, Block>& blocks,
+                             const Witnesses& of_t1, const Witnesses& of_t2,
+                             const Eigen::Vector3d& pivot, const FrameSpread& spread) {
+  const int n1 = of_t1.count(), total = n1 + of_t2.count();
+  Eigen::MatrixXd photos = Eigen::MatrixXd::Zero(at(total), at(total));
+  Eigen::MatrixXd coupling = Eigen::MatrixXd::Zero(at(total), 7);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(at(total));
+  const Matrix7 prior = spread.covariance().inverse();
+  for (int k = 0; k < total; ++k) photos.block<7, 7>(at(k), at(k)) = prior;
+  SurfaceEquations result;
+  for (const auto& [pair, block] : blocks) {
+    const Eigen::Index i = at(pair.first), j = at(n1 + pair.second);
+    // A photo's similarity about its own centre, as parameters about the pivot.
+    const Matrix7 a = pivot_change(pivot - of_t1.center(pair.first));
+    const Matrix7 b = pivot_change(pivot - of_t2.center(pair.second));
+    const Matrix7 ha = block.information * a, hb = block.information * b;
+    result.information += block.information;
+    result.gradient += block.gradient;
+    photos.block<7, 7>(i, i) += a.transpose() * ha;
+    photos.block<7, 7>(j, j) += b.transpose() * hb;
+    photos.block<7, 7>(i, j) -= a.transpose() * hb;
+    photos.block<7, 7>(j, i) -= b.transpose() * ha;
+    coupling.block<7, 7>(i, 0) += ha.transpose();
+    coupling.block<7, 7>(j, 0) -= hb.transpose();
+    gradient.segment<7>(i) += a.transpose() * block.gradient;
+    gradient.segment<7>(j) -= b.transpose() * block.gradient;
+  }
+  const Eigen::LLT<Eigen::MatrixXd> solver(photos);
+  result.gradient -= coupling.transpose() * solver.solve(gradient);
+  result.information -= coupling.transpose() * solver.solve(coupling);
+  result.information = 0.5 * (result.information + result.information.transpose()).eval();
+  return result;
+}
+
+}  // namespace
+
+double tukey_weight(double residual, double sigma) {
+  const double x = residual / (kTukeyTuning * sigma);
+  return x * x < 1 ? (1 - x * x) * (1 - x * x) : 0;
+}
+
+double tukey_loss(double residual, double sigma) {
+  const double x = residual / (kTukeyTuning * sigma);
+  const double rest = 1 - x * x;
+  return x * x < 1 ? 1 - rest * rest * rest : 1;
+}
+
+SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
+                                   const Eigen::Vector3d& pivot, const FrameSpread* frame_spread,
+                                   double min_sigma_u) {
+  const double sigma = residual_sigma(pairs, min_sigma_u);
+  const Witnesses of_t1(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
+  const Witnesses of_t2(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
+  std::map<std::pair<int, int>, Block> blocks;
+  Block independent;
+  for (const SurfacePair& pair : pairs) {
+    const double residual = pair.plane_residual();
+    const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
+    if (weight == 0) continue;
+    const Eigen::Vector3d arm = pair.moving - pivot;
+    Vector7 jacobian;
+    jacobian << arm.cross(pair.normal), pair.normal, pair.normal.dot(arm);
+    Block& block =
+        frame_spread ? blocks[{of_t1.of(pair.frame_t1), of_t2.of(pair.frame_t2)}] : independent;
+    block.information += weight * jacobian * jacobian.transpose();
+    block.gradient += weight * residual * jacobian;
+  }
+  SurfaceEquations result;
+  if (frame_spread) {
+    result = marginalise(blocks, of_t1, of_t2, pivot, *frame_spread);
+  } else {
+    result.information = independent.information;
+    result.gradient = independent.gradient;
+  }
+  result.sigma_u = sigma;
+  return result;
+}
+
+}  // namespace vggtcd
