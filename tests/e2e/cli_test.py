@@ -166,7 +166,9 @@ class Detect(unittest.TestCase):
             label, changed = change[f"label_{epoch}"], change[f"changed_{epoch}"]
             self.assertTrue(set(np.unique(label)) <= {0, code, 3, 255})
             np.testing.assert_array_equal(changed, label == code)
-            np.testing.assert_array_equal(label == 255, np.isnan(change[f"score_{epoch}"]))
+            judged = (label == 0) | (label == code)
+            for name_of in ("gap", "evidence", "confidence", "level_of_detection"):
+                np.testing.assert_array_equal(np.isfinite(change[f"{name_of}_{epoch}"]), judged)
             ply = read_ply(out / f"{name}.ply")
             np.testing.assert_array_equal(ply["scalar_label"] == code, ply["scalar_changed"] == 1)
             # Few alarms: the paper's distance calls most of this surface changed.

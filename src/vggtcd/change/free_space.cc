@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 
+#include "vggtcd/change/pair_alignment.h"
 #include "vggtcd/change/view_overlap.h"
 #include "vggtcd/change/vote_grid.h"
 #include "vggtcd/core/parallel.h"
@@ -22,8 +23,18 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr double kSigmaFromMad = 1.4826;
-constexpr double kMinGapSigma = 1e-3;  // of the depth: no network measures depth better
+constexpr double kMinGapSigma = 3e-3;       // of the depth: no network measures depth better
+constexpr double kMaxGate = 0.12;           // relative gaps beyond it are change, not misalignment
+constexpr double kGateSigmas = 5;           // of the gaps before the pairs are aligned
+constexpr int kAlignmentPointsAcross = 60;  // points of a photo that align it, along its width
+constexpr double kMaxEvidence = 8;          // sigmas; a vote can say no more
+constexpr int64_t kEvidenceSteps = 256;     // fixed-point steps of a sigma
+constexpr int64_t kUnitWeight = 16;         // of a vote over a quarter of the scene extent
+constexpr int64_t kMaxWeight = 256;
+constexpr float kSameSurface = 0.03f;  // relative depth step within a surface around a pixel
+constexpr int kSmoothReference = 260;  // width that smooth_radius is in pixels of
 constexpr double kGapSteps = 1 << 16;  // fixed-point steps of a gap, per scene extent
+constexpr size_t kDepthStride = 97;    // every 97th pixel is looked at for the median depth
 constexpr int kSigmaStride = 5;        // every 5th row and column is looked at for the scene's gaps
 
 // An epoch with everything that a point of the other one is held against, in the common frame T2.
@@ -92,11 +103,13 @@ Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, flo
 struct Projection {
   Eigen::Matrix3f matrix;
   Eigen::Vector3f offset;
+  float sigma = 0;  // relative, of the gaps of the pair; 0: gives no testimony
   int width, height;
 
-  Projection(const Rigid3& camera_from_t2, const Pinhole& pinhole)
-      : matrix((pinhole.matrix() * camera_from_t2.rotation).cast<float>()),
-        offset((pinhole.matrix() * camera_from_t2.translation).cast<float>()),
+  Projection(const PairAlignment& pair, const Pinhole& pinhole, double sigma_of_pair)
+      : matrix((pinhole.matrix() * pair.matrix).cast<float>()),
+        offset((pinhole.matrix() * pair.offset).cast<float>()),
+        sigma(static_cast<float>(sigma_of_pair)),
         width(pinhole.width),
         height(pinhole.height) {}
 
@@ -113,6 +126,80 @@ struct Projection {
   }
 };
 
+// What the sums are measured in, and the tolerance.
+struct Scale {
+  double gap_unit = 1;     // T2 units of a step
+  float weight_depth = 1;  // T2 units, at which a vote has unit weight
+  float tolerance_sigmas = 4;
+  double registration_sigma_u = 0;
+};
+
+void cast_vote(const Projection& pair, float near, float far, float z, const Scale& scale,
+               Votes& votes) {
+  const float tolerance = scale.tolerance_sigmas * pair.sigma * z;
+  if (!(pair.sigma > 0) || z - far > tolerance) return;  // says nothing, or hidden
+  const double gap = static_cast<double>(z < near ? near - z : (z > far ? far - z : 0.0f));
+  const double sigma = static_cast<double>(pair.sigma * z);
+  const int64_t weight = std::clamp<int64_t>(
+      std::lround(static_cast<float>(kUnitWeight) * scale.weight_depth / z), 1, kMaxWeight);
+  ++votes.count;
+  votes.weight += weight;
+  if (gap > static_cast<double>(tolerance)) votes.through += weight;
+  votes.gap += weight * std::lround(gap / scale.gap_unit);
+  votes.evidence += weight * std::lround(std::clamp(gap / sigma, -kMaxEvidence, kMaxEvidence) *
+                                         static_cast<double>(kEvidenceSteps));
+  votes.sigma += weight * std::lround(sigma / scale.gap_unit);
+}
+
+// The votes about a pixel per point that asked, so that every pixel counts the same.
+struct Tally {
+  float points = 0, count = 0, weight = 0, through = 0, gap = 0, evidence = 0, sigma = 0;
+
+  Tally() = default;
+  Tally(const Votes& votes, const Scale& scale) {
+    if (votes.points == 0) return;
+    const double share = 1.0 / votes.points, unit = share * scale.gap_unit;
+    points = 1;
+    count = static_cast<float>(share * votes.count);
+    weight = static_cast<float>(share * static_cast<double>(votes.weight));
+    through = static_cast<float>(share * static_cast<double>(votes.through));
+    gap = static_cast<float>(unit * static_cast<double>(votes.gap));
+    evidence = static_cast<float>(share * static_cast<double>(votes.evidence) / kEvidenceSteps);
+    sigma = static_cast<float>(unit * static_cast<double>(votes.sigma));
+  }
+  void operator+=(const Tally& other) {
+    points += other.points;
+    count += other.count;
+    weight += other.weight;
+    through += other.through;
+    gap += other.gap;
+    evidence += other.evidence;
+    sigma += other.sigma;
+  }
+};
+
+// Turns the votes about a pixel into its answer.
+void answer(const Tally& tally, ChangeLabel changed, const Scale& scale,
+            const FreeSpaceOptions& options, size_t pixel, EpochFreeSpace& result) {
+  const double photos = static_cast<double>(tally.count / tally.points);
+  result.label[pixel] = ChangeLabel::kUnobserved;
+  if (photos < options.min_votes || !(tally.weight > 0)) return;
+  const double through = static_cast<double>(tally.through / tally.weight);
+  const bool is_changed = through >= options.min_through_share;
+  result.label[pixel] = is_changed ? changed : ChangeLabel::kUnchanged;
+  result.gap[pixel] = tally.gap / tally.weight;
+  result.evidence[pixel] = tally.evidence / tally.weight;
+  // Agresti and Coull: two votes of either side added, so that unanimity of a few is not certainty.
+  const double share = (photos * through + 2) / (photos + 4);
+  const double deviation = std::sqrt(share * (1 - share) / (photos + 4));
+  const double side = (is_changed ? 1 : -1) * (through - options.min_through_share) / deviation;
+  result.confidence[pixel] = static_cast<float>(0.5 * std::erfc(-side / std::sqrt(2.0)));
+  const double sigma = static_cast<double>(tally.sigma / tally.weight);
+  result.level_of_detection[pixel] =
+      static_cast<float>(1.96 * std::sqrt(sigma * sigma / photos +
+                                          scale.registration_sigma_u * scale.registration_sigma_u));
+}
+
 // One direction: the points of `judged` (in T2) before the photos of the witness.
 class Direction {
  public:
@@ -122,9 +209,14 @@ class Direction {
         t2_from_judged_(t2_from_judged),
         witness_(witness),
         views_(std::move(views)),
-        min_confidence_(min_confidence) {
-    for (size_t j = 0; j < witness.camera_from_t2.size(); ++j) {
-      projections_.emplace_back(witness.camera_from_t2[j], witness.epoch->views[j].pinhole);
+        min_confidence_(min_confidence),
+        pairs_(views_.size()) {
+    for (size_t i = 0; i < views_.size(); ++i) {
+      for (const int j : views_[i]) {
+        const Rigid3& pose = witness.camera_from_t2[static_cast<size_t>(j)];
+        pairs_[i].emplace_back(PairAlignment{pose.rotation, pose.translation, 0, 0},
+                               witness.epoch->views[static_cast<size_t>(j)].pinhole, 0);
+      }
     }
   }
 
@@ -132,41 +224,58 @@ class Direction {
   void sample_gaps(std::vector<float>& gaps) const {
     for (int frame = 0; frame < judged_.num_frames(); ++frame) {
       for_each_point(frame, kSigmaStride, [&](size_t, const Eigen::Vector3f& x) {
-        for (const int j : views_[static_cast<size_t>(frame)]) {
-          size_t pixel = 0;
-          float z = 0;
-          if (!projections_[static_cast<size_t>(j)](x, pixel, z)) continue;
-          pixel += static_cast<size_t>(j) * witness_.epoch->pixels_per_frame();
-          if (witness_.far[pixel] <= 0) continue;
-          gaps.push_back((0.5f * (witness_.near[pixel] + witness_.far[pixel]) - z) / z);
-        }
+        for_each_witness(frame, x, [&](const Projection&, float near, float far, float z) {
+          gaps.push_back((0.5f * (near + far) - z) / z);
+        });
       });
     }
   }
 
+  // Gives every pair its sigma: of all gaps, or its own after aligning it.
+  void set_sigma(double sigma) {
+    for (auto& pairs : pairs_) {
+      for (Projection& pair : pairs) pair.sigma = static_cast<float>(sigma);
+    }
+  }
+  void align_pairs(double gate, double scene_extent_u, double max_sigma) {
+    const size_t per_frame = witness_.epoch->pixels_per_frame();
+    parallel_for(judged_.num_frames(), 1, [&](int64_t frame, int64_t) {
+      const size_t i = static_cast<size_t>(frame);
+      std::vector<Eigen::Vector3f> points;
+      for_each_point(static_cast<int>(frame), std::max(1, judged_.width / kAlignmentPointsAcross),
+                     [&](size_t, const Eigen::Vector3f& x) { points.push_back(x); });
+      for (size_t k = 0; k < views_[i].size(); ++k) {
+        const size_t j = static_cast<size_t>(views_[i][k]);
+        const WitnessPhoto photo{witness_.camera_from_t2[j], witness_.epoch->views[j].pinhole,
+                                 std::span(witness_.near).subspan(j * per_frame, per_frame),
+                                 std::span(witness_.far).subspan(j * per_frame, per_frame)};
+        const PairAlignment pair = align_pair(points, photo, gate, scene_extent_u, {});
+        const double sigma = std::max(kMinGapSigma, pair.gap_sigma);
+        pairs_[i][k] = Projection(pair, photo.pinhole, sigma > max_sigma ? 0 : sigma);
+      }
+    });
+  }
+
+  void add_sigmas(std::vector<float>& sigmas) const {
+    for (const auto& pairs : pairs_) {
+      for (const Projection& pair : pairs) sigmas.push_back(pair.sigma);
+    }
+  }
+
   // Votes of every point, fused over voxels. Grows the voxels if there are too many.
-  std::unique_ptr<VoteGrid> vote(float tolerance, double voxel_size, double gap_unit) const {
+  std::unique_ptr<VoteGrid> vote(const Scale& scale, double voxel_size) const {
     for (;; voxel_size *= 2) {
       auto grid = std::make_unique<VoteGrid>(voxel_size);
       std::atomic<bool> fits{true};
       parallel_for(judged_.num_frames(), 1, [&](int64_t frame, int64_t) {
         for_each_point(static_cast<int>(frame), 1, [&](size_t, const Eigen::Vector3f& x) {
           if (!fits.load(std::memory_order_relaxed)) return;
-          uint32_t votes = 0, through = 0;
-          int64_t gap_sum = 0;
-          for (const int j : views_[static_cast<size_t>(frame)]) {
-            size_t pixel = 0;
-            float z = 0;
-            if (!projections_[static_cast<size_t>(j)](x, pixel, z)) continue;
-            pixel += static_cast<size_t>(j) * witness_.epoch->pixels_per_frame();
-            const float near = witness_.near[pixel], far = witness_.far[pixel];
-            if (far <= 0 || z - far > tolerance * z) continue;  // says nothing, or hidden
-            const float gap = z < near ? near - z : (z > far ? far - z : 0.0f);
-            ++votes;
-            if (gap > tolerance * z) ++through;
-            gap_sum += static_cast<int64_t>(std::lround(static_cast<double>(gap) / gap_unit));
-          }
-          if (votes > 0 && !grid->add(x, votes, through, gap_sum)) fits.store(false);
+          Votes votes{.points = 1};
+          for_each_witness(static_cast<int>(frame), x,
+                           [&](const Projection& pair, float near, float far, float z) {
+                             cast_vote(pair, near, far, z, scale, votes);
+                           });
+          if (!grid->add(x, votes)) fits.store(false);
         });
       });
       if (fits) return grid;
@@ -174,27 +283,29 @@ class Direction {
   }
 
   // Reads the fused votes back into the photos.
-  EpochFreeSpace labels(const VoteGrid& grid, ChangeLabel changed, double gap_unit,
+  EpochFreeSpace labels(const VoteGrid& grid, ChangeLabel changed, const Scale& scale,
                         const FreeSpaceOptions& options) const {
     EpochFreeSpace result;
     result.label.assign(judged_.num_pixels(), ChangeLabel::kNoEvidence);
-    result.gap.assign(judged_.num_pixels(), kNaN);
-    result.votes.assign(judged_.num_pixels(), 0.0f);
-    result.through_share.assign(judged_.num_pixels(), kNaN);
+    for (auto* values :
+         {&result.gap, &result.evidence, &result.confidence, &result.level_of_detection}) {
+      values->assign(judged_.num_pixels(), kNaN);
+    }
     parallel_for(judged_.num_frames(), 1, [&](int64_t frame, int64_t) {
+      std::vector<Tally> tallies(judged_.pixels_per_frame());
+      const size_t first = static_cast<size_t>(frame) * judged_.pixels_per_frame();
       for_each_point(static_cast<int>(frame), 1, [&](size_t pixel, const Eigen::Vector3f& x) {
-        const Votes fused = grid.at(x);
-        const double votes = fused.points > 0 ? static_cast<double>(fused.votes) / fused.points : 0;
-        result.votes[pixel] = static_cast<float>(votes);
-        result.label[pixel] = ChangeLabel::kUnobserved;
-        if (votes < options.min_votes) return;
-        const double through = static_cast<double>(fused.through) / fused.votes;
-        result.through_share[pixel] = static_cast<float>(through);
-        result.gap[pixel] =
-            static_cast<float>(gap_unit * static_cast<double>(fused.gap_sum) / fused.votes);
-        result.label[pixel] =
-            through >= options.min_through_share ? changed : ChangeLabel::kUnchanged;
+        tallies[pixel - first] = Tally(grid.at(x), scale);
       });
+      for (int v = 0; v < judged_.height; ++v) {
+        for (int u = 0; u < judged_.width; ++u) {
+          const size_t pixel = first + index(u, v);
+          if (!(judged_.depth[pixel] > 0) || (!options.fill && tallies[index(u, v)].points == 0))
+            continue;
+          const Tally around = around_pixel(tallies, first, u, v, options.smooth_radius);
+          if (around.points > 0) answer(around, changed, scale, options, pixel, result);
+        }
+      }
     });
     return result;
   }
@@ -214,12 +325,47 @@ class Direction {
     }
   }
 
+  // visit(pair, near, far, z) for each photo that has testimony at the point's projection.
+  template <typename Visit>
+  void for_each_witness(int frame, const Eigen::Vector3f& x, Visit&& visit) const {
+    const size_t i = static_cast<size_t>(frame);
+    for (size_t k = 0; k < views_[i].size(); ++k) {
+      size_t pixel = 0;
+      float z = 0;
+      if (!pairs_[i][k](x, pixel, z)) continue;
+      pixel += static_cast<size_t>(views_[i][k]) * witness_.epoch->pixels_per_frame();
+      if (witness_.far[pixel] > 0)
+        visit(pairs_[i][k], witness_.near[pixel], witness_.far[pixel], z);
+    }
+  }
+
+  size_t index(int u, int v) const {
+    return static_cast<size_t>(v) * static_cast<size_t>(judged_.width) + static_cast<size_t>(u);
+  }
+
+  // The votes of the pixels around that show the same surface.
+  Tally around_pixel(const std::vector<Tally>& tallies, size_t first, int u, int v,
+                     int radius) const {
+    const int step = std::max(1, (judged_.width + kSmoothReference / 2) / kSmoothReference);
+    const float depth = judged_.depth[first + index(u, v)];
+    Tally sum;
+    for (int y = v - radius * step; y <= v + radius * step; y += step) {
+      if (y < 0 || y >= judged_.height) continue;
+      for (int x = u - radius * step; x <= u + radius * step; x += step) {
+        if (x < 0 || x >= judged_.width || tallies[index(x, y)].points == 0) continue;
+        if (std::abs(judged_.depth[first + index(x, y)] - depth) > kSameSurface * depth) continue;
+        sum += tallies[index(x, y)];
+      }
+    }
+    return sum;
+  }
+
   const Reconstruction& judged_;
   Sim3 t2_from_judged_;
   const Witness& witness_;
   std::vector<std::vector<int>> views_;
   float min_confidence_;
-  std::vector<Projection> projections_;
+  std::vector<std::vector<Projection>> pairs_;  // [frame][k], with views_[frame][k]
 };
 
 // The majority of the judged labels (unchanged, changed) in the window; a single pixel is noise.
@@ -258,6 +404,33 @@ double extent_of(const Reconstruction& after) {
   return robust_extent(unproject(after, confidence_threshold(after)).positions);
 }
 
+// The robust sigma of the relative gaps of all pairs as they come.
+double sigma_of_gaps(const Direction& t1, const Direction& t2) {
+  std::vector<float> gaps;
+  t1.sample_gaps(gaps);
+  t2.sample_gaps(gaps);
+  if (gaps.empty()) return 0;
+  for (float& gap : gaps) gap = std::abs(gap);
+  return kSigmaFromMad * static_cast<double>(median(gaps));
+}
+
+double median_sigma(const Direction& t1, const Direction& t2, double otherwise) {
+  std::vector<float> sigmas;
+  t1.add_sigmas(sigmas);
+  t2.add_sigmas(sigmas);
+  std::erase(sigmas, 0.0f);
+  return sigmas.empty() ? otherwise : static_cast<double>(median(sigmas));
+}
+
+// The median depth of a sample of the after epoch's pixels: T2 units.
+double t2_depth(const Reconstruction& after) {
+  std::vector<float> depths;
+  for (size_t pixel = 0; pixel < after.num_pixels(); pixel += kDepthStride) {
+    if (after.depth[pixel] > 0) depths.push_back(after.depth[pixel]);
+  }
+  return depths.empty() ? 0 : static_cast<double>(median(depths));
+}
+
 }  // namespace
 
 void FreeSpaceOptions::validate() const {
@@ -265,6 +438,8 @@ void FreeSpaceOptions::validate() const {
   check_field(min_confidence_rank >= 0 && min_confidence_rank < 1, "min_confidence_rank",
               min_confidence_rank, "a number in [0, 1)");
   check_field(tolerance_sigmas > 0, "tolerance_sigmas", tolerance_sigmas, "a positive number");
+  check_field(max_pair_sigma > 0, "max_pair_sigma", max_pair_sigma, "a positive number");
+  check_field(smooth_radius >= 0, "smooth_radius", smooth_radius, "at least 0");
   check_field(min_through_share > 0 && min_through_share <= 1, "min_through_share",
               min_through_share, "a number in (0, 1]");
   check_field(min_votes > 0, "min_votes", min_votes, "a positive number");
@@ -274,7 +449,7 @@ void FreeSpaceOptions::validate() const {
 
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
-                                   ProgressSink& progress) {
+                                   double registration_sigma_u, ProgressSink& progress) {
   options.validate();
   ProgressStage stage(progress, "free-space change");
   FreeSpaceChange result;
@@ -283,52 +458,55 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   const float min_confidence_t2 = confidence_rank(after, options.min_confidence_rank);
   const Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1);
   const Witness witness_t2 = make_witness(after, {}, min_confidence_t2);
-  stage.advance(0.2);
-  const Direction t1(before, t2_from_t1, witness_t2,
-                     overlapping_views(before, after, t2_from_t1, options.max_views),
-                     min_confidence_t1);
-  const Direction t2(after, {}, witness_t1,
-                     overlapping_views(after, before, t2_from_t1.inverse(), options.max_views),
-                     min_confidence_t2);
+  stage.advance(0.1);
+  Direction t1(before, t2_from_t1, witness_t2,
+               overlapping_views(before, after, t2_from_t1, options.max_views), min_confidence_t1);
+  Direction t2(after, {}, witness_t1,
+               overlapping_views(after, before, t2_from_t1.inverse(), options.max_views),
+               min_confidence_t2);
 
-  std::vector<float> gaps;
-  t1.sample_gaps(gaps);
-  t2.sample_gaps(gaps);
-  if (!gaps.empty()) {
-    for (float& gap : gaps) gap = std::abs(gap);
-    result.gap_sigma = kSigmaFromMad * static_cast<double>(median(gaps));
+  const double scene_sigma = std::max(kMinGapSigma, sigma_of_gaps(t1, t2));
+  const double gate = std::min(kMaxGate, kGateSigmas * scene_sigma);
+  for (Direction* direction : {&t1, &t2}) {
+    direction->set_sigma(scene_sigma);
+    if (options.align_pairs) {
+      direction->align_pairs(gate, result.scene_extent_u, options.max_pair_sigma);
+    }
   }
-  result.gap_sigma = std::max(result.gap_sigma, kMinGapSigma);
-  stage.advance(0.3);
+  result.gap_sigma = median_sigma(t1, t2, scene_sigma);
+  result.surface_sigma_u = result.gap_sigma * t2_depth(after);
+  stage.advance(0.2);
 
-  const float tolerance = static_cast<float>(options.tolerance_sigmas * result.gap_sigma);
+  const Scale scale{result.scene_extent_u / kGapSteps,
+                    static_cast<float>(result.scene_extent_u / 4),
+                    static_cast<float>(options.tolerance_sigmas), registration_sigma_u};
   const double voxel_size = result.scene_extent_u / options.fusion_grid;
-  const double gap_unit = result.scene_extent_u / kGapSteps;
-  result.t1 = t1.labels(*t1.vote(tolerance, voxel_size, gap_unit), ChangeLabel::kRemoved, gap_unit,
-                        options);
+  result.t1 = t1.labels(*t1.vote(scale, voxel_size), ChangeLabel::kRemoved, scale, options);
   stage.advance(0.6);
-  result.t2 =
-      t2.labels(*t2.vote(tolerance, voxel_size, gap_unit), ChangeLabel::kAdded, gap_unit, options);
-  stage.advance(0.9);
+  result.t2 = t2.labels(*t2.vote(scale, voxel_size), ChangeLabel::kAdded, scale, options);
   median_filter(result.t1.label, before, ChangeLabel::kRemoved, options.median_radius_px);
   median_filter(result.t2.label, after, ChangeLabel::kAdded, options.median_radius_px);
   return result;
 }
 
 void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes) {
-  const auto decide = [](std::vector<ChangeLabel> label, EpochChange& epoch) {
-    check(label.size() == epoch.score.size(), "decide_by_labels: the same photos");
-    epoch.changed = 0;
-    epoch.unobserved = 0;
-    for (size_t i = 0; i < label.size(); ++i) {
-      if (std::isnan(epoch.score[i])) label[i] = ChangeLabel::kNoEvidence;
-      epoch.changed += is_change(label[i]) ? 1 : 0;
-      epoch.unobserved += label[i] == ChangeLabel::kUnobserved ? 1 : 0;
+  changes.surface_sigma_u = free_space.surface_sigma_u;
+  const auto decide = [](EpochFreeSpace& votes, EpochChange& epoch) {
+    check(votes.label.size() == epoch.score.size(), "decide_by_labels: the same photos");
+    epoch.points = epoch.changed = epoch.unobserved = 0;
+    for (const ChangeLabel label : votes.label) {
+      epoch.points += label != ChangeLabel::kNoEvidence ? 1 : 0;
+      epoch.changed += is_change(label) ? 1 : 0;
+      epoch.unobserved += label == ChangeLabel::kUnobserved ? 1 : 0;
     }
-    epoch.label = std::move(label);
+    epoch.label = std::move(votes.label);
+    epoch.gap = std::move(votes.gap);
+    epoch.evidence = std::move(votes.evidence);
+    epoch.confidence = std::move(votes.confidence);
+    epoch.level_of_detection = std::move(votes.level_of_detection);
   };
-  decide(std::move(free_space.t1.label), changes.t1);
-  decide(std::move(free_space.t2.label), changes.t2);
+  decide(free_space.t1, changes.t1);
+  decide(free_space.t2, changes.t2);
 }
 
 }  // namespace vggtcd

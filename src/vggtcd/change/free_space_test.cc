@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/support/toy_scene.h"
+#include "vggtcd/change/pair_alignment.h"
 #include "vggtcd/change/view_overlap.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/scene/point_cloud.h"
@@ -111,10 +112,60 @@ TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
   const FreeSpaceChange five = free_space_changes(before, after, kT2FromT1, {});
   set_num_threads(2);
   EXPECT_EQ(one.t2.label, five.t2.label);
-  EXPECT_EQ(one.t2.votes, five.t2.votes);
-  for (size_t i = 0; i < one.t2.gap.size(); ++i) {
-    EXPECT_TRUE(one.t2.gap[i] == five.t2.gap[i] || std::isnan(one.t2.gap[i]));
+  for (const auto values : {&EpochFreeSpace::gap, &EpochFreeSpace::evidence,
+                            &EpochFreeSpace::confidence, &EpochFreeSpace::level_of_detection}) {
+    for (size_t i = 0; i < one.t2.gap.size(); ++i) {
+      const float a = (one.t2.*values)[i], b = (five.t2.*values)[i];
+      EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b)));
+    }
   }
+}
+
+TEST(FreeSpaceChanges, TheLevelOfDetectionIsNeverBelowWhatTheRegistrationAllows) {
+  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {}, 0.01);
+  int judged = 0;
+  for (size_t i = 0; i < after.num_pixels(); ++i) {
+    if (change.t2.label[i] == ChangeLabel::kUnobserved ||
+        change.t2.label[i] == ChangeLabel::kNoEvidence) {
+      continue;
+    }
+    ++judged;
+    EXPECT_GE(change.t2.level_of_detection[i], 1.96f * 0.01f * 0.999f);
+    EXPECT_GE(change.t2.confidence[i], 0);
+    EXPECT_LE(change.t2.confidence[i], 1);
+  }
+  EXPECT_GT(judged, 1000);
+}
+
+// Two photos of one wavy surface whose poses disagree: the pair is brought together again.
+TEST(AlignPair, RemovesASmallRotationAndScale) {
+  const auto waves = [](double x, double y) { return 0.2 * std::sin(2 * x) * std::cos(1.5 * y); };
+  const ToyScene toy{.frames = 2, .width = 96, .height = 72, .relief = waves};
+  const Reconstruction truth = reconstruct(toy, Sim3{});
+  const Sim3 wrong{
+      1.01, Eigen::AngleAxisd(0.006, Eigen::Vector3d::UnitY()).toRotationMatrix(), {0.01, 0, 0}};
+  std::vector<Eigen::Vector3f> points;
+  for (uint32_t pixel = 0; pixel < truth.pixels_per_frame(); pixel += 3) {
+    points.push_back((wrong * unproject_pixel(truth, pixel).cast<double>()).cast<float>());
+  }
+  const std::span<const float> depth = truth.frame_depth(1);
+  const WitnessPhoto photo{truth.views[1].camera_from_world, truth.views[1].pinhole, depth, depth};
+  const PairAlignment before = align_pair(points, photo, 0.1, 5, {.iterations = 0});
+  const PairAlignment after = align_pair(points, photo, 0.1, 5, {.iterations = 6});
+  EXPECT_GT(before.gap_sigma, 0.008);
+  EXPECT_LT(after.gap_sigma, 0.15 * before.gap_sigma);
+}
+
+TEST(AlignPair, WithoutCommonSurfaceCorrectsNothing) {
+  const Reconstruction r = reconstruct(scene(flat, 0), Sim3{});
+  const std::vector<Eigen::Vector3f> behind(100, Eigen::Vector3f(0, 0, -3));
+  const WitnessPhoto photo{r.views[0].camera_from_world, r.views[0].pinhole, r.frame_depth(0),
+                           r.frame_depth(0)};
+  const PairAlignment pair = align_pair(behind, photo, 0.1, 5, {});
+  EXPECT_EQ(pair.samples, 0);
+  EXPECT_EQ(pair.matrix, r.views[0].camera_from_world.rotation);
 }
 
 TEST(OverlappingViews, RanksTheViewFromTheSamePlaceFirst) {

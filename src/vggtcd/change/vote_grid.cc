@@ -7,7 +7,7 @@
 namespace vggtcd {
 namespace {
 
-constexpr uint64_t kSlots = uint64_t{1} << 22;
+constexpr uint64_t kSlots = uint64_t{1} << 21;
 constexpr uint64_t kMaxUsed = kSlots / 4 * 3;
 constexpr int64_t kHalfRange = int64_t{1} << 20;  // 21 bits per axis
 
@@ -32,8 +32,7 @@ std::optional<uint64_t> VoteGrid::key_of(const Eigen::Vector3f& position) const 
   return key + 1;  // 0 means free
 }
 
-bool VoteGrid::add(const Eigen::Vector3f& position, uint32_t votes, uint32_t through,
-                   int64_t gap_sum) {
+bool VoteGrid::add(const Eigen::Vector3f& position, const Votes& votes) {
   const auto key = key_of(position);
   if (!key) return true;
   for (uint64_t i = slot_of(*key);; i = (i + 1) & (kSlots - 1)) {
@@ -47,10 +46,13 @@ bool VoteGrid::add(const Eigen::Vector3f& position, uint32_t votes, uint32_t thr
       }
     }
     if (found != *key) continue;
-    slot.points.fetch_add(1, std::memory_order_relaxed);
-    slot.votes.fetch_add(votes, std::memory_order_relaxed);
-    slot.through.fetch_add(through, std::memory_order_relaxed);
-    slot.gap_sum.fetch_add(gap_sum, std::memory_order_relaxed);
+    slot.points.fetch_add(votes.points, std::memory_order_relaxed);
+    slot.count.fetch_add(votes.count, std::memory_order_relaxed);
+    slot.weight.fetch_add(votes.weight, std::memory_order_relaxed);
+    slot.through.fetch_add(votes.through, std::memory_order_relaxed);
+    slot.gap.fetch_add(votes.gap, std::memory_order_relaxed);
+    slot.evidence.fetch_add(votes.evidence, std::memory_order_relaxed);
+    slot.sigma.fetch_add(votes.sigma, std::memory_order_relaxed);
     return true;
   }
 }
@@ -63,9 +65,11 @@ Votes VoteGrid::at(const Eigen::Vector3f& position) const {
     const uint64_t found = slot.key.load(std::memory_order_relaxed);
     if (found == 0) return {};
     if (found != *key) continue;
-    return {slot.points.load(std::memory_order_relaxed), slot.votes.load(std::memory_order_relaxed),
-            slot.through.load(std::memory_order_relaxed),
-            slot.gap_sum.load(std::memory_order_relaxed)};
+    return {
+        slot.points.load(std::memory_order_relaxed), slot.count.load(std::memory_order_relaxed),
+        slot.weight.load(std::memory_order_relaxed), slot.through.load(std::memory_order_relaxed),
+        slot.gap.load(std::memory_order_relaxed),    slot.evidence.load(std::memory_order_relaxed),
+        slot.sigma.load(std::memory_order_relaxed)};
   }
 }
 

@@ -10,11 +10,15 @@
 
 namespace vggtcd {
 
+// Sums over votes. Those from `through` on are weighted by `weight`, in fixed point.
 struct Votes {
-  uint32_t points = 0;   // that voted
-  uint32_t votes = 0;    // photos that could tell, summed over the points
-  uint32_t through = 0;  // of them that look through
-  int64_t gap_sum = 0;   // of the signed gaps of all votes, fixed point
+  uint32_t points = 0;  // that asked
+  uint32_t count = 0;   // photos that could tell, summed over the points
+  int64_t weight = 0;
+  int64_t through = 0;   // weight of those that look through
+  int64_t gap = 0;       // signed gaps
+  int64_t evidence = 0;  // the same in sigmas
+  int64_t sigma = 0;     // sigmas of the gaps
 };
 
 // An open-addressing table of atomics. All sums are of integers, so their order does not matter.
@@ -24,7 +28,7 @@ class VoteGrid {
 
   // False if the table is too full: the caller starts again with larger voxels. Whether that
   // happens depends on the set of voxels, not on the order of the calls.
-  bool add(const Eigen::Vector3f& position, uint32_t votes, uint32_t through, int64_t gap_sum);
+  bool add(const Eigen::Vector3f& position, const Votes& votes);
 
   // Zeros for a voxel nobody voted in.
   Votes at(const Eigen::Vector3f& position) const;
@@ -34,8 +38,8 @@ class VoteGrid {
  private:
   struct Slot {
     std::atomic<uint64_t> key{0};  // 0: free
-    std::atomic<uint32_t> points{0}, votes{0}, through{0};
-    std::atomic<int64_t> gap_sum{0};
+    std::atomic<uint32_t> points{0}, count{0};
+    std::atomic<int64_t> weight{0}, through{0}, gap{0}, evidence{0}, sigma{0};
   };
   std::optional<uint64_t> key_of(const Eigen::Vector3f& position) const;
 

@@ -2,6 +2,8 @@
 // The whole job as numbered stages: two reconstructed epochs in, an aligned 3D change map out.
 #include "vggtcd/pipeline/detect.h"
 
+#include <cmath>
+
 #include "vggtcd/core/version.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/output_directory.h"
@@ -81,6 +83,14 @@ bool by_free_space(const EpochInputs& inputs, const DetectOptions& options) {
   return inputs.has_holes || options.alignment.method == AlignmentMethod::kRobust;
 }
 
+// The uncertainty of the registration where it is known: the mean over the axes of the
+// translation's variance (of the pivot, near the middle of the scene); 0 if only the paper's stages
+// ran.
+double registration_sigma_u(const Alignment& alignment) {
+  if (!alignment.robust) return 0;
+  return std::sqrt(alignment.robust->covariance.block<3, 3>(3, 3).trace() / 3);
+}
+
 }  // namespace
 
 std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
@@ -123,7 +133,9 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   if (by_free_space(inputs, options)) {
     log.run("free-space votes", [&](ProgressStage&) {
       decide_by_labels(
-          free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space), changes);
+          free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
+                             registration_sigma_u(outcome.alignment)),
+          changes);
     });
   }
   ChangeInstances instances;

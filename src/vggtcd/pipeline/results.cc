@@ -3,6 +3,7 @@
 #include "vggtcd/pipeline/results.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -110,11 +111,11 @@ std::vector<float> shown_scores(const EpochChange& change, size_t first, size_t 
   for (size_t i = 0; i < count; ++i) {
     switch (change.label[first + i]) {
       case ChangeLabel::kUnchanged:
-        shown[i] = std::min(shown[i], threshold);
+        shown[i] = std::isnan(shown[i]) ? 0 : std::min(shown[i], threshold);
         break;
       case ChangeLabel::kRemoved:
       case ChangeLabel::kAdded:
-        shown[i] = std::max(shown[i], 2 * threshold);
+        shown[i] = std::isnan(shown[i]) ? 2 * threshold : std::max(shown[i], 2 * threshold);
         break;
       default:
         shown[i] = std::numeric_limits<float>::quiet_NaN();
@@ -187,7 +188,9 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
                       const ChangeSet& changes) {
   const std::string comments[] = {"frame: T2, model units"};
   std::vector<std::string> fields = {"change_distance", "changed", "confidence"};
-  if (!change.label.empty()) fields.push_back("label");
+  if (!change.label.empty()) {
+    fields.insert(fields.end(), {"label", "label_confidence", "level_of_detection"});
+  }
   const size_t num_fields = fields.size();
   PlyWriter writer(path, static_cast<size_t>(change.points), std::move(fields), comments);
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
@@ -196,10 +199,17 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
     for (int v = 0; v < epoch.height; ++v) {
       for (int u = 0; u < epoch.width; ++u, ++pixel) {
         const float score = change.score[pixel];
-        if (std::isnan(score)) continue;
-        const float values[] = {
-            score, changes.changed(change, pixel) ? 1.0f : 0.0f, epoch.confidence[pixel],
-            change.label.empty() ? 0.0f : static_cast<float>(change.label[pixel])};
+        if (change.label.empty() ? std::isnan(score)
+                                 : change.label[pixel] == ChangeLabel::kNoEvidence) {
+          continue;
+        }
+        std::array<float, 6> values = {score, changes.changed(change, pixel) ? 1.0f : 0.0f,
+                                       epoch.confidence[pixel]};
+        if (!change.label.empty()) {
+          values[3] = static_cast<float>(change.label[pixel]);
+          values[4] = change.confidence[pixel];
+          values[5] = change.level_of_detection[pixel];
+        }
         writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel],
                    std::span(values).first(num_fields));
       }
@@ -228,6 +238,18 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
     writer.add<uint8_t>("label_t1", shape(before), label_t1);
     writer.add<uint8_t>("label_t2", shape(after), label_t2);
   }
+  const auto add_votes = [&](const char* suffix, const Reconstruction& r,
+                             const EpochChange& change) {
+    if (change.label.empty()) return;
+    for (const auto& [name, values] : {std::pair{"gap", &change.gap},
+                                       {"evidence", &change.evidence},
+                                       {"confidence", &change.confidence},
+                                       {"level_of_detection", &change.level_of_detection}}) {
+      writer.add<float>(fmt::format("{}_{}", name, suffix), shape(r), *values);
+    }
+  };
+  add_votes("t1", before, changes.t1);
+  add_votes("t2", after, changes.t2);
   writer.add<int32_t>("instance_t1", shape(before), instances.id_t1);
   writer.add<int32_t>("instance_t2", shape(after), instances.id_t2);
   writer.finish();

@@ -60,7 +60,7 @@ void encode_heat(const ReportEpoch& epoch, size_t frame, const LevelScale& scale
   const auto label =
       labelled ? std::span(epoch.label).subspan(frame * size, size) : std::span<const uint8_t>();
   for (size_t i = 0; i < size; ++i) {
-    if (std::isnan(score[i])) continue;
+    if (labelled ? label[i] == 255 : std::isnan(score[i])) continue;
     ++photo.pixels;
     photo.changed += labelled ? label[i] == 1 || label[i] == 2 || label[i] == 4
                               : score[i] > scale.edge(scale.threshold_level());

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// One photo of an epoch against one of the other, aligned once more: what is left of their poses',
+// scales' and the registration's errors is estimated on the surfaces that agree, and removed.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "vggtcd/geometry/pinhole.h"
+#include "vggtcd/geometry/rigid3.h"
+
+namespace vggtcd {
+
+struct PairAlignmentOptions {
+  double prior_rotation_rad = 0.005;  // standard deviations of what there is to remove: rotation,
+  double prior_translation = 0.005;   // translation (share of the scene extent)
+  double prior_log_scale = 0.01;      // and scale
+  int iterations = 4;
+};
+
+// A photo of the other epoch, depth in T2 units; 0 where there is none that may testify.
+struct WitnessPhoto {
+  Rigid3 camera_from_t2;
+  Pinhole pinhole;
+  std::span<const float> near, far;  // [H, W] extremes of the window around each pixel
+};
+
+struct PairAlignment {
+  // x_in_camera = matrix * x_in_t2 + offset: the pose with the correction in it; its z is the depth
+  // to be compared with the photo's.
+  Eigen::Matrix3d matrix;
+  Eigen::Vector3d offset;
+  double gap_sigma = 0;  // robust sigma of the relative gaps (depth / z - 1) that are left
+  int samples = 0;       // points on smooth surface that agree within the gate
+};
+
+// Gauss-Newton with Tukey weights on the relative depth gaps of `points` (T2) on smooth surface in
+// the photo, over a small similarity about its camera: p + w x p + t + s p. gate: gaps beyond it
+// are change, not error. With fewer than 50 samples nothing is corrected and gap_sigma is gate / 4.
+PairAlignment align_pair(std::span<const Eigen::Vector3f> points, const WitnessPhoto& photo,
+                         double gate, double scene_extent_u, const PairAlignmentOptions& options);
+
+}  // namespace vggtcd
