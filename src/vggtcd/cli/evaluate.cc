@@ -100,11 +100,13 @@ void run_change(const Arguments& arguments) {
       "recall                    {:>12.3f} {:>12.3f}\n"
       "F1                        {:>12.3f} {:>12.3f}\n"
       "AUPRC                     {:>12.3f} {:>12.3f}\n"
-      "never-seen called changed {:>11.1f} %\n",
+      "never-seen called changed {:>11.1f} %\n"
+      "most change found in      {}, {}\n",
       s.frames_t1, s.true_frames_t1, s.frames_t2, s.true_frames_t2, s.cameras.ate_mean,
       100 * s.evidence_share, "evidence", "every pixel", s.evidence.precision,
       s.every_pixel.precision, s.evidence.recall, s.every_pixel.recall, s.evidence.f1,
-      s.every_pixel.f1, s.evidence.auprc, s.every_pixel.auprc, 100 * s.unseen_called_changed);
+      s.every_pixel.f1, s.evidence.auprc, s.every_pixel.auprc, 100 * s.unseen_called_changed,
+      s.most_changed_t1, s.most_changed_t2);
   if (arguments.out.empty()) return;
   write_json_file(arguments.out, Json{{"frames_t1", s.frames_t1},
                                       {"frames_t2", s.frames_t2},
@@ -115,6 +117,8 @@ void run_change(const Arguments& arguments) {
                                       {"rre_mean_deg", s.cameras.rre_mean_deg},
                                       {"evidence_share", s.evidence_share},
                                       {"unseen_called_changed", s.unseen_called_changed},
+                                      {"most_changed_t1", s.most_changed_t1},
+                                      {"most_changed_t2", s.most_changed_t2},
                                       {"evidence", change_json(s.evidence)},
                                       {"every_pixel", change_json(s.every_pixel)}});
 }

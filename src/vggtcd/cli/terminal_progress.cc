@@ -43,7 +43,7 @@ class PlainLines : public NoticesOnly {
   void stage_advanced(std::string_view stage, double fraction) override {
     constexpr double kEverySeconds = 30;
     const double now = monotonic_seconds();
-    if (now - shown_s_ < kEverySeconds || fraction <= 0) return;
+    if (now - shown_s_ < kEverySeconds || fraction <= 0 || fraction >= 1) return;
     shown_s_ = now;
     const double left = (now - started_s_) * (1 - fraction) / fraction;
     fmt::print(stderr, "{}: {:.0f} %, {} left\n", stage, 100 * fraction, duration_text(left));

@@ -41,6 +41,7 @@ int number_in(const std::string& name, const std::string& folder) {
 // One epoch of the results: its cameras, and the true frame of each of its frames.
 struct ResultFrames {
   std::vector<Rigid3> poses;
+  std::vector<std::string> names;
   std::vector<int> true_frame;
 };
 
@@ -50,7 +51,12 @@ ResultFrames frames_of(const Trajectory& all, const std::string& folder, int tru
   for (const NamedPose& pose : all) {
     if (!pose.name.starts_with(folder)) continue;
     frames.poses.push_back(pose.camera_from_world);
+    frames.names.push_back(pose.name);
     frames.true_frame.push_back(number_in(pose.name, folder));
+  }
+  if (frames.poses.empty()) {
+    throw_error(ErrorCode::kInput, "{}: colmap/: expected cameras named {}..., found none",
+                results.string(), folder);
   }
   const auto named = [&](int frame) { return frame >= 0 && frame < true_frames; };
   if (std::all_of(frames.true_frame.begin(), frames.true_frame.end(), named)) return frames;
@@ -125,6 +131,15 @@ Ranks rank_pixels(const NpzReader& change, const std::string& suffix, const Resu
   return ranks;
 }
 
+std::string most_changed(const ResultFrames& frames, const std::vector<int64_t>& found) {
+  size_t best = 0;
+  const auto count_of = [&](size_t k) { return found[static_cast<size_t>(frames.true_frame[k])]; };
+  for (size_t k = 1; k < frames.names.size(); ++k) {
+    if (count_of(k) > count_of(best)) best = k;
+  }
+  return frames.names.at(best);
+}
+
 float largest_score(const NpzReader& change) {
   float largest = 0;
   for (const std::string suffix : kSuffix) {
@@ -138,9 +153,12 @@ float largest_score(const NpzReader& change) {
 struct Counts {
   ScoredPixels evidence, every_pixel;
   int64_t seen = 0, unseen = 0, unseen_called = 0;
+  std::vector<int64_t> found_in_frame;  // of the epoch that was counted last
 };
 
-void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks, Counts& counts) {
+void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks, const Maps& maps,
+           Counts& counts) {
+  counts.found_in_frame.assign(maps.frames, 0);
   const auto label = truth.read<uint8_t>("changed" + suffix);
   const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
   for (size_t pixel = 0; pixel < label.size(); ++pixel) {
@@ -157,6 +175,7 @@ void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks
     const bool called = rank > ranks.called;
     counts.every_pixel.add(rank, called, changed);
     if (rank != kNoEvidence) counts.evidence.add(rank, called, changed);
+    if (changed && called) ++counts.found_in_frame[pixel / maps.per_frame()];
   }
 }
 
@@ -175,6 +194,7 @@ ResultsScores score_results(const std::filesystem::path& results,
   const BitemporalTrajectory true_cameras = read_true_cameras(truth_npz);
   const float called = largest_score(change);
   Counts counts;
+  ResultsScores scores;
   BitemporalTrajectory found, expected;
   for (const int e : {0, 1}) {
     const std::string suffix = kSuffix[e];
@@ -186,9 +206,10 @@ ResultsScores score_results(const std::filesystem::path& results,
     for (const int k : frames.true_frame) {
       (e == 0 ? expected.t1 : expected.t2).push_back(true_poses[static_cast<size_t>(k)]);
     }
-    count(truth, suffix, rank_pixels(change, suffix, frames, maps, called), counts);
+    count(truth, suffix, rank_pixels(change, suffix, frames, maps, called), maps, counts);
+    (e == 0 ? scores.most_changed_t1 : scores.most_changed_t2) =
+        most_changed(frames, counts.found_in_frame);
   }
-  ResultsScores scores;
   scores.frames_t1 = static_cast<int>(found.t1.size());
   scores.frames_t2 = static_cast<int>(found.t2.size());
   scores.true_frames_t1 = static_cast<int>(true_cameras.t1.size());

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "vggtcd/evaluation/change_metrics.h"
 #include "vggtcd/evaluation/trajectory_metrics.h"
@@ -25,6 +26,8 @@ struct ResultsScores {
   ChangeScores every_pixel;                    // the same, and pixels without evidence
   double evidence_share = 0;                   // of the pixels of surface both epochs saw
   double unseen_called_changed = 0;  // of unchanged surface that the other epoch never saw
+  // The frames with most pixels that are rightly called changed, as in the results' colmap/.
+  std::string most_changed_t1, most_changed_t2;
 };
 
 // `results` is a directory that detect wrote, from photos named by their frame number (0003.jpg) or

@@ -109,6 +109,7 @@ TEST_F(Results, AreCountedPixelByPixelOfTheTruth) {
   EXPECT_DOUBLE_EQ(scores.evidence.precision, 2.0 / 3);
   EXPECT_DOUBLE_EQ(scores.evidence.recall, 2.0 / 3);
   EXPECT_DOUBLE_EQ(scores.every_pixel.recall, 2.0 / 5);
+  EXPECT_EQ(scores.most_changed_t1, "before/0000.jpg");
   // The never-seen pixel lies in the photo that was not placed.
   EXPECT_DOUBLE_EQ(scores.unseen_called_changed, 0);
 }

@@ -52,14 +52,15 @@ Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, S
 }
 
 Json inputs_json(const EpochInputs& inputs, const Epochs& epochs) {
-  const auto epoch = [](const std::filesystem::path& path, const Reconstruction& r) {
-    return Json{{"file", path.filename().string()},
+  const auto epoch = [](const std::filesystem::path& path, const Reconstruction& r,
+                        const std::string& name = "") {
+    return Json{{"file", name.empty() ? path.filename().string() : name},
                 {"frames", r.num_frames()},
                 {"width", r.width},
                 {"height", r.height}};
   };
-  Json json = {{"before", epoch(inputs.before, epochs.before)},
-               {"after", epoch(inputs.after, epochs.after)}};
+  Json json = {{"before", epoch(inputs.before, epochs.before, inputs.before_name)},
+               {"after", epoch(inputs.after, epochs.after, inputs.after_name)}};
   if (epochs.joint) {
     json["joint"] = epoch(*inputs.joint, epochs.joint->reconstruction);
     json["joint"]["keyframes_t1"] = epochs.joint->keyframes_t1;

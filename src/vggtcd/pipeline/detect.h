@@ -23,6 +23,7 @@ struct EpochInputs {
   std::optional<std::filesystem::path> joint;         // the joint pass over keyframes of both
   std::optional<std::filesystem::path> initial_sim3;  // a sim3.json: t2_from_t1
   bool aligned = false;                               // both epochs are in one frame already
+  std::string before_name, after_name;                // what the user named, if not these files
   std::string origin;      // a sentence for the summary: how the files were made, if we made them
   bool has_holes = false;  // depth is missing where it was hard to find: a hole says nothing
 };

@@ -51,6 +51,12 @@ EpochPhotos prediction_of(const std::string& source, ProgressSink& progress) {
   return epoch;
 }
 
+// "photos/before/" -> "before"
+std::string last_part(const std::string& source) {
+  const fs::path path(source);
+  return (path.has_filename() ? path : path.parent_path()).filename().string();
+}
+
 uint64_t fnv1a(const std::string& text) {
   uint64_t hash = 0xcbf29ce484222325u;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
@@ -173,6 +179,8 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path
   done.inputs.before = photos.before.given ? fs::path(inputs.before) : kept / kBeforeFile;
   done.inputs.after = photos.after.given ? fs::path(inputs.after) : kept / kAfterFile;
   done.inputs.joint = kept / kJointFile;
+  done.inputs.before_name = last_part(inputs.before);
+  done.inputs.after_name = last_part(inputs.after);
   done.explanation =
       json_member(read_json_file(complete), "explanation", complete.string()).get<std::string>();
   done.inputs.origin = done.explanation;

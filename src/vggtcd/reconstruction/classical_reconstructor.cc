@@ -179,7 +179,9 @@ void append(const EpochTask& task, const SfmResult& sfm, const Frames& frames, s
   epoch.views.push_back({frames.views[i].camera_from_world, frames.views[i].pinhole,
                          task.name_of(sfm, task.views[i])});
   add(epoch.depth, map.depth);
-  add(epoch.confidence, map.confidence);
+  // Agreement has decided already. The rule that the more confident half of an epoch is evidence
+  // would take half of it again, and all of a photo with few neighbours.
+  for (const float depth : map.depth) epoch.confidence.push_back(depth > 0 ? 1.0f : 0.0f);
   add(epoch.color, frames.colors[i].rgb);
 }
 
@@ -246,7 +248,7 @@ void renumber(const EpochPhotos& photos, const Reconstruction& placed,
 
 std::string ClassicalReconstructor::fingerprint() const {
   return fmt::format(
-      "classical 2; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
+      "classical 3; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
       options_.keyframes, options_.frame_side_px, options_.sfm.max_features,
       options_.depth.sweep.num_planes, options_.depth.sweep.best_views, options_.views.max_sources);
 }
