@@ -31,10 +31,10 @@ FrameSize frame_size(int photo_width, int photo_height, int side) {
 }
 
 // Seconds of one thread of a Zen 5 server, measured on the generated scenes of docs/benchmark.md.
-constexpr double kSecondsPerPhoto = 1.0;        // read, key points
-constexpr double kSecondsPerPair = 0.03;        // matching
-constexpr double kSecondsPerPlaced = 0.5;       // COLMAP, which runs with one thread
-constexpr double kSecondsPerPlanePixel = 1e-7;  // depth: a pixel of a plane
+constexpr double kSecondsPerPhoto = 0.28;         // read, key points
+constexpr double kSecondsPerPair = 0.05;          // matching
+constexpr double kSecondsPerPlaced = 0.6;         // COLMAP, which runs with one thread
+constexpr double kSecondsPerPlanePixel = 7.5e-8;  // depth: a pixel of a plane
 
 const char* orientation_of(const Image& image) {
   return image.width >= image.height ? "landscape" : "portrait";
