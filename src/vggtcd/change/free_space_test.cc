@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "tests/support/toy_scene.h"
@@ -122,8 +123,8 @@ TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
 }
 
 TEST(FreeSpaceChanges, TheLevelOfDetectionIsNeverBelowWhatTheRegistrationAllows) {
-  const Reconstruction before = reconstruct(scene(flat, 0), Sim3{});
-  const Reconstruction after = reconstruct(scene(with_box, 0.1), kT2FromT1);
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {}, 0.01);
   int judged = 0;
   for (size_t i = 0; i < after.num_pixels(); ++i) {
@@ -159,7 +160,7 @@ TEST(AlignPair, RemovesASmallRotationAndScale) {
 }
 
 TEST(AlignPair, WithoutCommonSurfaceCorrectsNothing) {
-  const Reconstruction r = reconstruct(scene(flat, 0), Sim3{});
+  const Reconstruction r = reconstruct(scene(flat_relief, 0), Sim3{});
   const std::vector<Eigen::Vector3f> behind(100, Eigen::Vector3f(0, 0, -3));
   const WitnessPhoto photo{r.views[0].camera_from_world, r.views[0].pinhole, r.frame_depth(0),
                            r.frame_depth(0)};
