@@ -28,16 +28,16 @@ ChangeAnswer answer_of(const ChangeSet& changes, const EpochChange& epoch) {
   return answer;
 }
 
-// The labels decide, the signed gap ranks; what nobody saw ranks last.
-ChangeAnswer answer_of(const EpochChange& epoch, const std::vector<float>& gap) {
-  ChangeAnswer answer{gap, {}};
-  answer.called.resize(gap.size());
-  for (size_t pixel = 0; pixel < gap.size(); ++pixel) {
+// The labels decide, the gap in sigmas ranks; what nobody saw ranks last.
+ChangeAnswer answer_of(const EpochChange& epoch, const std::vector<float>& rank) {
+  ChangeAnswer answer{rank, {}};
+  answer.called.resize(rank.size());
+  for (size_t pixel = 0; pixel < rank.size(); ++pixel) {
     const ChangeLabel label = epoch.label[pixel];
     answer.called[pixel] = is_change(label) ? 1 : 0;
     if (label == ChangeLabel::kNoEvidence) {
       answer.score[pixel] = std::numeric_limits<float>::quiet_NaN();
-    } else if (label == ChangeLabel::kUnobserved || std::isnan(gap[pixel])) {
+    } else if (label == ChangeLabel::kUnobserved || std::isnan(rank[pixel])) {
       answer.score[pixel] = kLowest;
     }
   }
@@ -126,10 +126,10 @@ ChangeBenchmark benchmark_changes(const ChangeProblem& problem, const Sim3& t2_f
                  alignment, result);
   result.instances.push_back(
       {"distance", alignment, score_instances(problem, t2_from_t1, changes)});
-  FreeSpaceChange free_space = free_space_changes(before, after, t2_from_t1, {}, progress);
-  const std::vector<float> gap_t1 = free_space.t1.gap, gap_t2 = free_space.t2.gap;
+  FreeSpaceChange free_space = free_space_changes(before, after, t2_from_t1, {}, 0, progress);
+  const std::vector<float> rank_t1 = free_space.t1.evidence, rank_t2 = free_space.t2.evidence;
   decide_by_labels(std::move(free_space), changes);
-  score_all_ways(truth, answer_of(changes.t1, gap_t1), answer_of(changes.t2, gap_t2), "votes",
+  score_all_ways(truth, answer_of(changes.t1, rank_t1), answer_of(changes.t2, rank_t2), "votes",
                  alignment, result);
   result.instances.push_back({"votes", alignment, score_instances(problem, t2_from_t1, changes)});
   return result;
