@@ -27,10 +27,10 @@ constexpr double kMinGapSigma = 3e-3;       // of the depth: no network measures
 constexpr double kMaxGate = 0.12;           // relative gaps beyond it are change, not misalignment
 constexpr double kGateSigmas = 5;           // of the gaps before the pairs are aligned
 constexpr int kAlignmentPointsAcross = 60;  // points of a photo that align it, along its width
-constexpr double kMaxEvidence = 8;          // sigmas; a vote can say no more
-constexpr int64_t kEvidenceSteps = 256;     // fixed-point steps of a sigma
-constexpr int64_t kUnitWeight = 16;         // of a vote over a quarter of the scene extent
-constexpr int64_t kMaxWeight = 256;
+constexpr float kMaxEvidence = 8;           // sigmas; a vote can say no more
+constexpr float kEvidenceSteps = 256;       // fixed-point steps of a sigma
+constexpr double kUnitWeight = 16;          // of a vote over a quarter of the scene extent
+constexpr int kMaxWeight = 256;
 constexpr float kSameSurface = 0.03f;  // relative depth step within a surface around a pixel
 constexpr int kSmoothReference = 260;  // width that smooth_radius is in pixels of
 constexpr double kGapSteps = 1 << 16;  // fixed-point steps of a gap, per scene extent
@@ -128,28 +128,42 @@ struct Projection {
 
 // What the sums are measured in, and the tolerance.
 struct Scale {
-  double gap_unit = 1;     // T2 units of a step
-  float weight_depth = 1;  // T2 units, at which a vote has unit weight
+  double gap_unit = 1;       // T2 units of a step
+  float weight_steps_u = 1;  // weight of a vote times its depth, T2 units
   float tolerance_sigmas = 4;
   double registration_sigma_u = 0;
 };
 
-void cast_vote(const Projection& pair, float near, float far, float z, const Scale& scale,
-               Votes& votes) {
-  const float tolerance = scale.tolerance_sigmas * pair.sigma * z;
-  if (!(pair.sigma > 0) || z - far > tolerance) return;  // says nothing, or hidden
-  const double gap = static_cast<double>(z < near ? near - z : (z > far ? far - z : 0.0f));
-  const double sigma = static_cast<double>(pair.sigma * z);
-  const int64_t weight = std::clamp<int64_t>(
-      std::lround(static_cast<float>(kUnitWeight) * scale.weight_depth / z), 1, kMaxWeight);
-  ++votes.count;
-  votes.weight += weight;
-  if (gap > static_cast<double>(tolerance)) votes.through += weight;
-  votes.gap += weight * std::lround(gap / scale.gap_unit);
-  votes.evidence += weight * std::lround(std::clamp(gap / sigma, -kMaxEvidence, kMaxEvidence) *
-                                         static_cast<double>(kEvidenceSteps));
-  votes.sigma += weight * std::lround(sigma / scale.gap_unit);
-}
+// The votes of one point, in T2 units; `weight` is in whole steps, so the sums of many points are
+// exact whatever their order.
+struct PointVotes {
+  uint32_t count = 0;
+  int weight = 0, through = 0;
+  float gap = 0, evidence = 0, sigma = 0;  // weighted
+
+  void cast(const Projection& pair, float near, float far, float z, const Scale& scale) {
+    const float sigma_u = pair.sigma * z, tolerance = scale.tolerance_sigmas * sigma_u;
+    if (!(sigma_u > 0) || z - far > tolerance) return;  // says nothing, or hidden
+    const float gap_u = z < near ? near - z : (z > far ? far - z : 0.0f);
+    const int steps = std::clamp(static_cast<int>(scale.weight_steps_u / z + 0.5f), 1, kMaxWeight);
+    const float w = static_cast<float>(steps);
+    ++count;
+    weight += steps;
+    if (gap_u > tolerance) through += steps;
+    gap += w * gap_u;
+    evidence += w * std::clamp(gap_u / sigma_u, -kMaxEvidence, kMaxEvidence);
+    sigma += w * sigma_u;
+  }
+  Votes rounded(const Scale& scale) const {
+    return {.points = 1,
+            .count = count,
+            .weight = weight,
+            .through = through,
+            .gap = std::llround(static_cast<double>(gap) / scale.gap_unit),
+            .evidence = std::llround(evidence * kEvidenceSteps),
+            .sigma = std::llround(static_cast<double>(sigma) / scale.gap_unit)};
+  }
+};
 
 // The votes about a pixel per point that asked, so that every pixel counts the same.
 struct Tally {
@@ -164,7 +178,8 @@ struct Tally {
     weight = static_cast<float>(share * static_cast<double>(votes.weight));
     through = static_cast<float>(share * static_cast<double>(votes.through));
     gap = static_cast<float>(unit * static_cast<double>(votes.gap));
-    evidence = static_cast<float>(share * static_cast<double>(votes.evidence) / kEvidenceSteps);
+    evidence = static_cast<float>(share * static_cast<double>(votes.evidence) /
+                                  static_cast<double>(kEvidenceSteps));
     sigma = static_cast<float>(unit * static_cast<double>(votes.sigma));
   }
   void operator+=(const Tally& other) {
@@ -270,12 +285,12 @@ class Direction {
       parallel_for(judged_.num_frames(), 1, [&](int64_t frame, int64_t) {
         for_each_point(static_cast<int>(frame), 1, [&](size_t, const Eigen::Vector3f& x) {
           if (!fits.load(std::memory_order_relaxed)) return;
-          Votes votes{.points = 1};
+          PointVotes votes;
           for_each_witness(static_cast<int>(frame), x,
                            [&](const Projection& pair, float near, float far, float z) {
-                             cast_vote(pair, near, far, z, scale, votes);
+                             votes.cast(pair, near, far, z, scale);
                            });
-          if (!grid->add(x, votes)) fits.store(false);
+          if (!grid->add(x, votes.rounded(scale))) fits.store(false);
         });
       });
       if (fits) return grid;
@@ -478,7 +493,7 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   stage.advance(0.2);
 
   const Scale scale{result.scene_extent_u / kGapSteps,
-                    static_cast<float>(result.scene_extent_u / 4),
+                    static_cast<float>(kUnitWeight * result.scene_extent_u / 4),
                     static_cast<float>(options.tolerance_sigmas), registration_sigma_u};
   const double voxel_size = result.scene_extent_u / options.fusion_grid;
   result.t1 = t1.labels(*t1.vote(scale, voxel_size), ChangeLabel::kRemoved, scale, options);
