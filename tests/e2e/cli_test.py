@@ -47,7 +47,8 @@ class Detect(unittest.TestCase):
         cls.temporary = tempfile.TemporaryDirectory()
         cls.root = pathlib.Path(cls.temporary.name)
         cls.out = cls.root / "out"
-        cls.arguments = ["detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz"]
+        cls.inputs = ["detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz"]
+        cls.arguments = [*cls.inputs, "--method", "paper"]
         done = run(*cls.arguments, "-o", cls.out)
         assert done.returncode == 0, done.stderr
         cls.stdout = done.stdout
@@ -59,6 +60,19 @@ class Detect(unittest.TestCase):
     def test_names_the_verdict_and_the_files(self):
         self.assertRegex(self.stdout, r"(Refined|Kept)")
         self.assertIn("overlays", self.stdout)
+
+    def test_by_default_the_papers_alignment_and_votes(self):
+        out = self.root / "default"
+        done = run(*self.inputs, "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads((out / "sim3.json").read_text())["scale"],
+                         json.loads((self.out / "sim3.json").read_text())["scale"])
+        change = np.load(out / "change.npz")
+        for epoch, changed_label in (("t1", 1), ("t2", 2)):
+            label = change["label_" + epoch]
+            np.testing.assert_array_equal(change["changed_" + epoch], label == changed_label)
+            self.assertGreater((label == 3).sum(), 0)
+        self.assertNotIn("label_t1", np.load(self.out / "change.npz"))
 
     def test_sim3_maps_the_points_of_t1_onto_the_ply(self):
         sim3 = json.loads((self.out / "sim3.json").read_text())

@@ -2,7 +2,7 @@
 // The colours of change. Below the threshold a point is static and stays in the cold part of the map;
 // from the threshold to the end of the scale it runs through the warm part.
 
-import type { Label } from './data';
+import { kNoEvidence, type Label } from './data';
 
 export type Rgb = [number, number, number];
 export type MapName = 'spectrum' | 'safe';
@@ -56,8 +56,8 @@ export function levelColor(map: MapName, level: number, threshold: number, count
 
 // [256, 4] RGBA by level, for a texture or for painting pixels.
 export function levelTable(map: MapName, threshold: number, count: number): Uint8Array<ArrayBuffer> {
-  const table = new Uint8Array(256 * 4);
-  for (let level = 0; level < 256; ++level) {
+  const table = new Uint8Array(256 * 4).fill(kLabelColors.unobserved[1]);  // grey where no distance is known
+  for (let level = 0; level < kNoEvidence; ++level) {
     table.set([...levelColor(map, level, threshold, count), 255], 4 * level);
   }
   return table;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the user has chosen, in one place; parts of the page listen to the keys they draw from.
 import type { MapName } from './colormap';
-import { hasLabels, isChangedLabel, type Report } from './data';
+import { hasLabels, isChangedLabel, kNoEvidence, type Report } from './data';
 
 export interface State {
   tab: 'view' | 'photos' | 'numbers';
@@ -25,7 +25,7 @@ export const decidesByLabel = (report: Report, { color }: Pick<State, 'color'>):
 
 // The same as a test of a point: its level and its label.
 export const changedTest = (report: Report, state: Pick<State, 'color' | 'threshold'>): ((level: number, label: number) => boolean) =>
-  (decidesByLabel(report, state) ? (_, label) => isChangedLabel(label) : (level) => level > state.threshold);
+  (decidesByLabel(report, state) ? (_, label) => isChangedLabel(label) : (level) => level > state.threshold && level !== kNoEvidence);
 
 type Listener = (state: State) => void;
 

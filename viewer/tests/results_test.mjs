@@ -22,7 +22,8 @@ let browser;
 let summary;
 before(async () => {
   browser = await launch();
-  run('detect', path.join(example, 't1.npz'), path.join(example, 't2.npz'), '--joint', path.join(example, 'joint.npz'), '-o', out);
+  run('detect', path.join(example, 't1.npz'), path.join(example, 't2.npz'), '--joint', path.join(example, 'joint.npz'),
+    '--method', 'paper', '-o', out);
   run('view', out);
   summary = JSON.parse(readFileSync(path.join(out, 'summary.json'), 'utf8'));
 });

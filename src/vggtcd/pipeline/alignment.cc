@@ -5,7 +5,8 @@
 namespace vggtcd {
 
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod) {
-  static constexpr EnumName<AlignmentMethod> kNames[] = {{AlignmentMethod::kCoarse, "coarse"},
+  static constexpr EnumName<AlignmentMethod> kNames[] = {{AlignmentMethod::kAuto, "auto"},
+                                                         {AlignmentMethod::kCoarse, "coarse"},
                                                          {AlignmentMethod::kPaper, "paper"},
                                                          {AlignmentMethod::kRobust, "robust"}};
   return kNames;
@@ -46,7 +47,7 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       result.fine = align_fine(before, after, result.initial_t2_from_t1, options.fine);
     });
   }
-  if (options.method == AlignmentMethod::kPaper) {
+  if (options.method == AlignmentMethod::kPaper || options.method == AlignmentMethod::kAuto) {
     result.t2_from_t1 = result.fine->t2_from_t1;
     if (result.fine->verdict == FineVerdict::kRefined) result.chosen = "fine";
     result.verdict = enum_to_string(result.fine->verdict);

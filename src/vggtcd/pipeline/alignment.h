@@ -19,6 +19,7 @@
 namespace vggtcd {
 
 enum class AlignmentMethod {
+  kAuto,    // the refinement that the benchmark shows to be best without a doubt: Algorithm 1
   kCoarse,  // the initial similarity as it is
   kPaper,   // and Algorithm 1 on top of it
   kRobust   // the best of initial, Algorithm 1 and the robust Sim(3) refinement
@@ -26,7 +27,7 @@ enum class AlignmentMethod {
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
 
 struct AlignmentOptions {
-  AlignmentMethod method = AlignmentMethod::kPaper;
+  AlignmentMethod method = AlignmentMethod::kAuto;
   bool shared_intrinsics = false;
   CoarseOptions coarse;
   FineOptions fine;
@@ -34,11 +35,10 @@ struct AlignmentOptions {
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("method", self.method,
-          "robust: all seven parameters from the static surfaces, and change by free-space votes. "
-          "paper: the "
-          "paper's translation refinement with its residual self-check, and change by "
-          "nearest-neighbour "
-          "distance. coarse: the joint pass alone, change as in paper.");
+          "auto: the paper's translation refinement with its residual self-check, and change by "
+          "free-space votes. paper: the same alignment, and change by nearest-neighbour distance, "
+          "all as in the paper. coarse: the joint pass alone, change as in paper. robust: all "
+          "seven parameters from the static surfaces, and change by free-space votes.");
     field("shared_intrinsics", self.shared_intrinsics,
           "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
           "match, as "

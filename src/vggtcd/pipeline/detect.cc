@@ -81,7 +81,8 @@ bool by_free_space(const EpochInputs& inputs, const DetectOptions& options) {
   if (options.change_method != ChangeMethod::kAuto) {
     return options.change_method == ChangeMethod::kFreeSpace;
   }
-  return inputs.has_holes || options.alignment.method == AlignmentMethod::kRobust;
+  const AlignmentMethod method = options.alignment.method;
+  return inputs.has_holes || method == AlignmentMethod::kAuto || method == AlignmentMethod::kRobust;
 }
 
 // The uncertainty of the registration where it is known: the mean over the axes of the

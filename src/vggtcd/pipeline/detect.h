@@ -29,7 +29,7 @@ struct EpochInputs {
 };
 
 enum class ChangeMethod {
-  kAuto,       // votes with method robust and for reconstructions with holes, else distance
+  kAuto,       // distance with methods paper and coarse unless depth has holes, else votes
   kDistance,   // the paper's nearest-neighbour distance
   kFreeSpace,  // votes of the photos that should see a point
 };
@@ -52,7 +52,8 @@ struct DetectOptions {
           "free_space: "
           "changed is what the photos of the other epoch look through; what none of them sees is "
           "unobserved. "
-          "auto: free_space with --method robust and for photos without a network, else distance.");
+          "auto: distance with --method paper and coarse, else, and for photos without a network, "
+          "free_space.");
     field("change", self.change, "");
     field("free_space", self.free_space, "");
     field("instances", self.instances, "");

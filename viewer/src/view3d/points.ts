@@ -25,7 +25,7 @@ const vertexShader = /* glsl */ `
   out vec3 v_color;
   void main() {
     int label = int(color_label.w * 255.0 + 0.5);
-    bool changed = by_label ? (label == 1 || label == 2 || label == 4) : position.w > threshold;
+    bool changed = by_label ? (label == 1 || label == 2 || label == 4) : position.w > threshold && position.w < 254.5;
     vec3 photo = color_label.rgb;
     float shade = 0.72 + 0.45 * dot(photo, vec3(0.3, 0.6, 0.1));
     if (mode == 0) v_color = photo;
