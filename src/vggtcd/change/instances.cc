@@ -42,14 +42,22 @@ class EpochRegions {
     position_sigma_u_ = std::max(voxel_size_ / std::sqrt(12.0), changes.surface_sigma_u);
     margin_u_ = changes.surface_sigma_u;
     group();
-    const double min_size = options.min_size_fraction * changes.scene_extent_u;
+    const double extent = changes.scene_extent_u;
+    const auto is_thing = [&](const InstancePart& part) {
+      return part.box.size[0] >= options.min_size_fraction * extent &&
+             part.box.size[1] >= options.min_width_fraction * extent &&
+             part.confidence >= options.min_confidence;
+    };
     const Eigen::Vector3f mean = mean_color(epoch);
     std::vector<std::optional<InstancePart>> parts(members_.size());
     parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
       const auto& members = members_[static_cast<size_t>(i)];
-      if (members.size() < static_cast<size_t>(options.min_instance_points)) return;
+      if (members.size() < static_cast<size_t>(options.min_instance_points) ||
+          photos_of(members).size() < static_cast<size_t>(options.min_photos)) {
+        return;
+      }
       InstancePart part = measure(members, mean);
-      if (part.box.size[0] >= min_size) parts[static_cast<size_t>(i)] = std::move(part);
+      if (is_thing(part)) parts[static_cast<size_t>(i)] = std::move(part);
     });
     for (size_t i = 0; i < parts.size(); ++i) {
       if (!parts[i]) continue;
@@ -255,6 +263,10 @@ void InstanceOptions::validate() const {
   check_field(link_fraction > 0, "link_fraction", link_fraction, "a positive number");
   check_field(min_voxel_points >= 1, "min_voxel_points", min_voxel_points, "at least 1");
   check_field(min_size_fraction >= 0, "min_size_fraction", min_size_fraction, "at least 0");
+  check_field(min_width_fraction >= 0, "min_width_fraction", min_width_fraction, "at least 0");
+  check_field(min_photos >= 1, "min_photos", min_photos, "at least 1");
+  check_field(min_confidence >= 0 && min_confidence <= 1, "min_confidence", min_confidence,
+              "a number in [0, 1]");
   check_field(min_instance_points >= 1, "min_instance_points", min_instance_points, "at least 1");
   check_field(move_shape_ratio > 0 && move_shape_ratio <= 1, "move_shape_ratio", move_shape_ratio,
               "a number in (0, 1]");

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -149,7 +150,17 @@ TEST(FindInstances, TheBestPhotoShowsTheMostOfIt) {
 
 TEST(FindInstances, ThingsBelowTheMinimumSizeAreLeftOut) {
   const Case c = make_case(flat, right_box);
+  EXPECT_FALSE(instances_of(c).instances.empty());
   EXPECT_TRUE(instances_of(c, {.min_size_fraction = 0.9}).instances.empty());
+  EXPECT_TRUE(instances_of(c, {.min_width_fraction = 0.9}).instances.empty());
+  EXPECT_TRUE(instances_of(c, {.min_photos = c.after.num_frames() + 1}).instances.empty());
+}
+
+TEST(FindInstances, ThingsOfWhichTheVotesAreUnsureAreLeftOut) {
+  Case c = make_case(flat, right_box);
+  std::ranges::fill(c.changes.t2.confidence, 0.5f);
+  EXPECT_TRUE(instances_of(c).instances.empty());
+  EXPECT_FALSE(instances_of(c, {.min_confidence = 0.4}).instances.empty());
 }
 
 TEST(FindInstances, WithoutChangeThereAreNone) {
