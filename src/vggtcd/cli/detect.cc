@@ -93,7 +93,7 @@ void add_detect(Program& program) {
   add_fields(command, arguments->options.free_space, "Change");
   add_fields(command, arguments->options.instances, "Instances");
   add_field(command, "overlays", arguments->options.overlays,
-            "Write overlays/: each photo beside its heat map.");
+            "Write overlays/: each photo beside its changes.");
   add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");
   add_fields(command, arguments->options.report, "Page");
   command->footer(

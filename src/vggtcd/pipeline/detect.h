@@ -57,7 +57,7 @@ struct DetectOptions {
     field("change", self.change, "");
     field("free_space", self.free_space, "");
     field("instances", self.instances, "");
-    field("overlays", self.overlays, "Write overlays/: each photo beside its heat map.");
+    field("overlays", self.overlays, "Write overlays/: each photo beside its changes.");
     field("page", self.page, "Write report.html: everything in one page.");
     field("report", self.report, "");
   };

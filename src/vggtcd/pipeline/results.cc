@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/io/colmap.h"
@@ -99,29 +98,6 @@ std::vector<uint8_t> label_codes(const EpochChange& change) {
   codes.reserve(change.label.size());
   for (const ChangeLabel label : change.label) codes.push_back(static_cast<uint8_t>(label));
   return codes;
-}
-
-// What the heat map shows: the distance, kept on the side of the threshold that the label decides;
-// grey where nothing was observed.
-std::vector<float> shown_scores(const EpochChange& change, size_t first, size_t count,
-                                float threshold) {
-  const auto begin = change.score.begin() + static_cast<int64_t>(first);
-  std::vector<float> shown(begin, begin + static_cast<int64_t>(count));
-  if (change.label.empty()) return shown;
-  for (size_t i = 0; i < count; ++i) {
-    switch (change.label[first + i]) {
-      case ChangeLabel::kUnchanged:
-        shown[i] = std::isnan(shown[i]) ? 0 : std::min(shown[i], threshold);
-        break;
-      case ChangeLabel::kRemoved:
-      case ChangeLabel::kAdded:
-        shown[i] = std::isnan(shown[i]) ? 2 * threshold : std::max(shown[i], 2 * threshold);
-        break;
-      default:
-        shown[i] = std::numeric_limits<float>::quiet_NaN();
-    }
-  }
-  return shown;
 }
 
 Trajectory trajectory_of(const std::vector<View>& views) {
@@ -261,10 +237,14 @@ void write_overlays(const std::filesystem::path& directory, const Reconstruction
   const size_t per_frame = epoch.pixels_per_frame();
   parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
     const size_t index = static_cast<size_t>(frame);
-    const Image overlay = render_overlay(
-        epoch.frame_color(static_cast<int>(frame)),
-        shown_scores(change, index * per_frame, per_frame, static_cast<float>(changes.threshold_u)),
-        epoch.height, epoch.width, {changes.threshold_u, changes.bound_u});
+    const size_t first = index * per_frame;
+    const auto color = epoch.frame_color(static_cast<int>(frame));
+    const Image overlay =
+        change.label.empty()
+            ? render_overlay(color, std::span(change.score).subspan(first, per_frame), epoch.height,
+                             epoch.width, {changes.threshold_u, changes.bound_u})
+            : render_label_overlay(color, std::span(change.label).subspan(first, per_frame),
+                                   epoch.height, epoch.width);
     const std::string stem = std::filesystem::path(epoch.views[index].name).stem().string();
     write_png(directory / (stem + ".png"), overlay);
   });

@@ -40,7 +40,8 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
                       const Reconstruction& after, const ChangeSet& changes,
                       const ChangeInstances& instances);
 
-// One PNG per photo into `directory`, named like the photo.
+// One PNG per photo into `directory`, named like the photo: beside it its distances or, where
+// labels decide, its answers.
 void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,
                     const EpochChange& change, const ChangeSet& changes);
 

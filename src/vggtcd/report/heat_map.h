@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The colours of change: blue (static), green, yellow, red, and each photo beside its heat map.
+// The colours of change, and each photo beside its change: a heat map of distances, or the answers
+// of the votes.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <span>
 
+#include "vggtcd/change/change_label.h"
 #include "vggtcd/scene/image.h"
 
 namespace vggtcd {
@@ -24,6 +26,16 @@ struct HeatScale {
 // and score are [height, width, 3] and [height, width].
 Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score, int height,
                      int width, const HeatScale& scale);
+
+// The colour of an answer, the report page's own (viewer/src/colormap.ts). Not for kNoEvidence,
+// which has none.
+std::array<uint8_t, 3> label_color(ChangeLabel label);
+
+// The same picture where labels decide: right of the photo a dim grey one under the colours of the
+// four answers, dim alone where there is no evidence; below them the legend. label is [height,
+// width]. The greys of unchanged, unobserved and no evidence stay apart on any photo.
+Image render_label_overlay(std::span<const uint8_t> rgb, std::span<const ChangeLabel> label,
+                           int height, int width);
 
 // Each pixel of a photo of this width is a square of so many pixels in the overlay, the photo's
 // first one in the overlay's top left corner: read_results takes the photo from there.

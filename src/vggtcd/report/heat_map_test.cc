@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -40,11 +42,83 @@ TEST(RenderOverlay, KeepsThePhotoAndColoursOnlyPixelsWithEvidence) {
   EXPECT_EQ(unknown[1], unknown[2]);
 }
 
+// The rule of a distance overlay, spelled out: any change of a byte above the legend fails.
+TEST(RenderOverlay, PaintsThreeQuartersOfTheHeatOverAQuarterOfTheLight) {
+  const int height = 2, width = 2;
+  const std::vector<uint8_t> rgb = {10, 20, 30, 250, 120, 0, 0, 0, 0, 255, 255, 255};
+  const std::vector<float> score = {0.3f, 2.5f, 1.0f, std::numeric_limits<float>::quiet_NaN()};
+  const Image image = render_overlay(rgb, score, height, width, {1.0, 2.0});
+  // heat: a fraction f of the bound is 3 f of the way along the four stops.
+  const uint8_t expected[4][3] = {{31, 90, 117}, {197, 62, 58}, {106, 144, 52}, {114, 114, 114}};
+  for (int y = 0; y < 2 * 180; ++y) {
+    for (int x = 0; x < 2 * 180; ++x) {
+      const size_t i = static_cast<size_t>(2 * (y / 180) + x / 180);
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_EQ(image.pixel(x, y)[c], rgb[3 * i + static_cast<size_t>(c)]);
+        ASSERT_NEAR(image.pixel(364 + x, y)[c], expected[i][c], 1) << i << " " << c;
+      }
+    }
+  }
+}
+
 TEST(RenderOverlay, RefusesMismatchedSizes) {
   const std::vector<uint8_t> rgb(12, 100);
   const std::vector<float> score(3, 0.0f);
   EXPECT_THROW(render_overlay(rgb, score, 2, 2, {1.0, 2.0}), Error);
 }
+
+using Label = ChangeLabel;
+
+TEST(RenderLabelOverlay, ShowsTheAnswersInTheColoursOfThePage) {
+  const int height = 1, width = 5;
+  std::vector<uint8_t> rgb;
+  for (const int light : {0, 100, 200, 255, 80})
+    rgb.insert(rgb.end(), 3, static_cast<uint8_t>(light));
+  const std::vector<Label> label = {Label::kUnchanged, Label::kRemoved, Label::kAdded,
+                                    Label::kUnobserved, Label::kNoEvidence};
+  const Image image = render_label_overlay(rgb, label, height, width);
+  const int zoom = overlay_zoom(width), panel = zoom * width;
+  ASSERT_EQ(image.width, 2 * panel + 4);
+  // 3/4 of viewer/src/colormap.ts kLabelColors and 1/5 of the light; 1/4 of the light alone.
+  const double colors[4][3] = {{164, 173, 186}, {213, 94, 0}, {0, 158, 115}, {92, 97, 106}};
+  for (int i = 0; i < width; ++i) {
+    const double light = rgb[3 * static_cast<size_t>(i)];
+    for (int c = 0; c < 3; ++c) {
+      const double expected = i < 4 ? 0.75 * colors[i][c] + 0.2 * light : 0.25 * light;
+      for (const int x : {i * zoom, (i + 1) * zoom - 1}) {
+        EXPECT_NEAR(image.pixel(panel + 4 + x, zoom - 1)[c], expected, 1) << i;  // truncated
+        EXPECT_EQ(image.pixel(x, 0)[c], light);  // read_results takes the photo from here
+      }
+    }
+  }
+}
+
+TEST(RenderLabelOverlay, TheLegendHasASwatchOfEachAnswerInItsOrder) {
+  const std::vector<uint8_t> rgb(12, 100);
+  const Image image = render_label_overlay(rgb, std::vector<Label>(4, Label::kNoEvidence), 2, 2);
+  std::vector<std::array<uint8_t, 3>> swatches;  // runs of 12 pixels of one colour, left to right
+  for (int x = 364, run = 1; x < image.width; ++x) {
+    const uint8_t *at = image.pixel(x, 360 + 16), *left = at - 3;
+    run = std::equal(at, at + 3, left) ? run + 1 : 1;
+    const std::array<uint8_t, 3> color = {at[0], at[1], at[2]};
+    if (run == 12 && color != std::array<uint8_t, 3>{24, 24, 24}) swatches.push_back(color);
+  }
+  EXPECT_THAT(swatches,
+              testing::ElementsAre(label_color(Label::kUnchanged), label_color(Label::kRemoved),
+                                   label_color(Label::kAdded), label_color(Label::kUnobserved)));
+}
+
+TEST(RenderLabelOverlay, TheGreysStayApartOnAnyPhoto) {
+  std::vector<uint8_t> rgb = {0, 0, 0, 255, 255, 255, 255, 255, 255, 0, 0, 0};
+  const std::vector<Label> label = {Label::kUnchanged, Label::kUnobserved, Label::kNoEvidence,
+                                    Label::kUnobserved};
+  const Image image = render_label_overlay(rgb, label, 2, 2);
+  const auto red = [&](int x, int y) { return image.pixel(364 + 180 * x, 180 * y)[0]; };
+  EXPECT_GT(red(0, 0), red(1, 0));  // the darkest unchanged, the lightest unobserved
+  EXPECT_GT(red(1, 1), red(0, 1));  // the darkest unobserved, the lightest no evidence
+}
+
+TEST(LabelColor, NoEvidenceHasNone) { EXPECT_THROW(label_color(Label::kNoEvidence), Error); }
 
 }  // namespace
 }  // namespace vggtcd
