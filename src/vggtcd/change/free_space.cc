@@ -3,7 +3,6 @@
 #include "vggtcd/change/free_space.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 #include "vggtcd/change/pair_alignment.h"
 #include "vggtcd/change/view_overlap.h"
 #include "vggtcd/change/vote_grid.h"
+#include "vggtcd/change/witness.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
@@ -37,95 +37,6 @@ constexpr double kGapSteps = 1 << 16;  // fixed-point steps of a gap, per scene 
 constexpr size_t kDepthStride = 97;    // every 97th pixel is looked at for the median depth
 constexpr int kSigmaStride = 5;        // every 5th row and column is looked at for the scene's gaps
 
-// An epoch with everything that a point of the other one is held against, in the common frame T2.
-struct Witness {
-  const Reconstruction* epoch = nullptr;
-  std::vector<Rigid3> camera_from_t2;  // depths in T2 units
-  double depth_scale = 1;              // T2 units per unit of the epoch
-  std::vector<float> near,
-      far;  // [S, H, W] T2 units: extremes of the 3 x 3 window; far 0: no testimony
-};
-
-float confidence_rank(const Reconstruction& r, double share) {
-  std::vector<float> values;
-  values.reserve(r.num_pixels());
-  for (size_t i = 0; i < r.num_pixels(); ++i) {
-    if (r.depth[i] > 0) values.push_back(r.confidence[i]);
-  }
-  if (values.empty())
-    throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
-                r.num_frames());
-  const double percents[] = {100 * share};
-  return static_cast<float>(percentiles(values, percents)[0]);
-}
-
-// A pixel may testify, and be judged, if it has depth and is not among the least confident.
-bool testifies(const Reconstruction& r, size_t pixel, float min_confidence) {
-  return r.depth[pixel] > 0 && r.confidence[pixel] >= min_confidence;
-}
-
-Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence) {
-  Witness witness;
-  witness.epoch = &epoch;
-  witness.depth_scale = t2_from_epoch.scale;
-  for (const View& view : epoch.views) {
-    witness.camera_from_t2.push_back(camera_from_new_world(view.camera_from_world, t2_from_epoch));
-  }
-  witness.near.resize(epoch.num_pixels());
-  witness.far.resize(epoch.num_pixels());
-  const int height = epoch.height, width = epoch.width;
-  parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
-    const size_t first = static_cast<size_t>(frame) * epoch.pixels_per_frame();
-    for (int v = 0; v < height; ++v) {
-      for (int u = 0; u < width; ++u) {
-        float lo = std::numeric_limits<float>::max(), hi = 0;
-        for (int y = std::max(0, v - 1); y <= std::min(height - 1, v + 1); ++y) {
-          for (int x = std::max(0, u - 1); x <= std::min(width - 1, u + 1); ++x) {
-            const size_t i = first + static_cast<size_t>(y) * static_cast<size_t>(width) +
-                             static_cast<size_t>(x);
-            if (!testifies(epoch, i, min_confidence)) continue;
-            lo = std::min(lo, epoch.depth[i]);
-            hi = std::max(hi, epoch.depth[i]);
-          }
-        }
-        const size_t i =
-            first + static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
-        const float scale = static_cast<float>(witness.depth_scale);
-        witness.near[i] = lo * scale;
-        witness.far[i] = hi * scale;
-      }
-    }
-  });
-  return witness;
-}
-
-// The projection of a view as floats, for the inner loop.
-struct Projection {
-  Eigen::Matrix3f matrix;
-  Eigen::Vector3f offset;
-  float sigma = 0;  // relative, of the gaps of the pair; 0: gives no testimony
-  int width, height;
-
-  Projection(const PairAlignment& pair, const Pinhole& pinhole, double sigma_of_pair)
-      : matrix((pinhole.matrix() * pair.matrix).cast<float>()),
-        offset((pinhole.matrix() * pair.offset).cast<float>()),
-        sigma(static_cast<float>(sigma_of_pair)),
-        width(pinhole.width),
-        height(pinhole.height) {}
-
-  // The pixel index within the frame and the depth; false if the point is outside the photo.
-  bool operator()(const Eigen::Vector3f& x, size_t& pixel, float& depth) const {
-    const Eigen::Vector3f h = matrix * x + offset;
-    depth = h.z();
-    if (!(depth > 0)) return false;
-    const float u = h.x() / depth + 0.5f, v = h.y() / depth + 0.5f;
-    if (!(u >= 0 && v >= 0 && u < static_cast<float>(width) && v < static_cast<float>(height)))
-      return false;
-    pixel = static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
-    return true;
-  }
-};
-
 // What the sums are measured in, and the tolerance.
 struct Scale {
   double gap_unit = 1;       // T2 units of a step
@@ -134,6 +45,11 @@ struct Scale {
   double registration_sigma_u = 0;
 };
 
+// The weight of a vote from this depth, in steps.
+int weight_of(float z, const Scale& scale) {
+  return std::clamp(static_cast<int>(scale.weight_steps_u / z + 0.5f), 1, kMaxWeight);
+}
+
 // The votes of one point, in T2 units; `weight` is in whole steps, so the sums of many points are
 // exact whatever their order.
 struct PointVotes {
@@ -141,18 +57,16 @@ struct PointVotes {
   int weight = 0, through = 0;
   float gap = 0, evidence = 0, sigma = 0;  // weighted
 
-  void cast(const Projection& pair, float near, float far, float z, const Scale& scale) {
-    const float sigma_u = pair.sigma * z, tolerance = scale.tolerance_sigmas * sigma_u;
-    if (!(sigma_u > 0) || z - far > tolerance) return;  // says nothing, or hidden
-    const float gap_u = z < near ? near - z : (z > far ? far - z : 0.0f);
-    const int steps = std::clamp(static_cast<int>(scale.weight_steps_u / z + 0.5f), 1, kMaxWeight);
+  void cast(const Testimony& said, const Scale& scale) {
+    if (said.vote != Vote::kSees && said.vote != Vote::kLooksThrough) return;
+    const int steps = weight_of(said.z, scale);
     const float w = static_cast<float>(steps);
     ++count;
     weight += steps;
-    if (gap_u > tolerance) through += steps;
-    gap += w * gap_u;
-    evidence += w * std::clamp(gap_u / sigma_u, -kMaxEvidence, kMaxEvidence);
-    sigma += w * sigma_u;
+    if (said.vote == Vote::kLooksThrough) through += steps;
+    gap += w * said.gap_u;
+    evidence += w * std::clamp(said.gap_u / said.sigma_u, -kMaxEvidence, kMaxEvidence);
+    sigma += w * said.sigma_u;
   }
   Votes rounded(const Scale& scale) const {
     return {.points = 1,
@@ -239,8 +153,8 @@ class Direction {
   void sample_gaps(std::vector<float>& gaps) const {
     for (int frame = 0; frame < judged_.num_frames(); ++frame) {
       for_each_point(frame, kSigmaStride, [&](size_t, const Eigen::Vector3f& x) {
-        for_each_witness(frame, x, [&](const Projection&, float near, float far, float z) {
-          gaps.push_back((0.5f * (near + far) - z) / z);
+        for_each_witness(frame, x, 0, [&](size_t, const Testimony& said) {
+          if (said.far > 0) gaps.push_back((0.5f * (said.near + said.far) - said.z) / said.z);
         });
       });
     }
@@ -249,7 +163,7 @@ class Direction {
   // Gives every pair its sigma: of all gaps, or its own after aligning it.
   void set_sigma(double sigma) {
     for (auto& pairs : pairs_) {
-      for (Projection& pair : pairs) pair.sigma = static_cast<float>(sigma);
+      for (PairProjection& pair : pairs) pair.sigma = static_cast<float>(sigma);
     }
   }
   void align_pairs(double gate, double scene_extent_u, double max_sigma) {
@@ -266,14 +180,14 @@ class Direction {
                                  std::span(witness_.far).subspan(j * per_frame, per_frame)};
         const PairAlignment pair = align_pair(points, photo, gate, scene_extent_u, {});
         const double sigma = std::max(kMinGapSigma, pair.gap_sigma);
-        pairs_[i][k] = Projection(pair, photo.pinhole, sigma > max_sigma ? 0 : sigma);
+        pairs_[i][k] = PairProjection(pair, photo.pinhole, sigma > max_sigma ? 0 : sigma);
       }
     });
   }
 
   void add_sigmas(std::vector<float>& sigmas) const {
     for (const auto& pairs : pairs_) {
-      for (const Projection& pair : pairs) sigmas.push_back(pair.sigma);
+      for (const PairProjection& pair : pairs) sigmas.push_back(pair.sigma);
     }
   }
 
@@ -286,10 +200,8 @@ class Direction {
         for_each_point(static_cast<int>(frame), 1, [&](size_t, const Eigen::Vector3f& x) {
           if (!fits.load(std::memory_order_relaxed)) return;
           PointVotes votes;
-          for_each_witness(static_cast<int>(frame), x,
-                           [&](const Projection& pair, float near, float far, float z) {
-                             votes.cast(pair, near, far, z, scale);
-                           });
+          for_each_witness(static_cast<int>(frame), x, scale.tolerance_sigmas,
+                           [&](size_t, const Testimony& said) { votes.cast(said, scale); });
           if (!grid->add(x, votes.rounded(scale))) fits.store(false);
         });
       });
@@ -307,11 +219,8 @@ class Direction {
       values->assign(judged_.num_pixels(), kNaN);
     }
     parallel_for(judged_.num_frames(), 1, [&](int64_t frame, int64_t) {
-      std::vector<Tally> tallies(judged_.pixels_per_frame());
       const size_t first = static_cast<size_t>(frame) * judged_.pixels_per_frame();
-      for_each_point(static_cast<int>(frame), 1, [&](size_t pixel, const Eigen::Vector3f& x) {
-        tallies[pixel - first] = Tally(grid.at(x), scale);
-      });
+      const std::vector<Tally> tallies = tallies_of(static_cast<int>(frame), grid, scale);
       for (int v = 0; v < judged_.height; ++v) {
         for (int u = 0; u < judged_.width; ++u) {
           const size_t pixel = first + index(u, v);
@@ -323,6 +232,42 @@ class Direction {
       }
     });
     return result;
+  }
+
+  // What every photo said about one pixel, and the fused votes; the answer itself is in the labels.
+  PixelExplanation explain(const PixelQuestion& question, const VoteGrid& grid, const Scale& scale,
+                           const FreeSpaceOptions& options) const {
+    const size_t i = static_cast<size_t>(question.frame);
+    const size_t first = i * judged_.pixels_per_frame();
+    const size_t pixel = first + index(question.x, question.y);
+    PixelExplanation why;
+    why.question = question;
+    why.photo = (question.in_after ? "after/" : "before/") + judged_.views[i].name;
+    why.min_through_share = options.min_through_share;
+    why.through_share = static_cast<double>(kNaN);
+    why.voted = testifies(judged_, pixel, min_confidence_);
+    if (!(judged_.depth[pixel] > 0)) return why;
+    const PixelRays rays(judged_.views[i], t2_from_judged_);
+    const Eigen::Vector3f x = rays.point(question.x, question.y, judged_.depth[pixel]);
+    for_each_witness(
+        question.frame, x, scale.tolerance_sigmas, [&](size_t k, const Testimony& said) {
+          const View& view = witness_.epoch->views[static_cast<size_t>(views_[i][k])];
+          PhotoTestimony photo{(question.in_after ? "before/" : "after/") + view.name, -1, -1, said,
+                               0};
+          if (said.vote != Vote::kOutside) {
+            photo.x = static_cast<int>(said.pixel % static_cast<size_t>(view.pinhole.width));
+            photo.y = static_cast<int>(said.pixel / static_cast<size_t>(view.pinhole.width));
+          }
+          PointVotes votes;
+          votes.cast(said, scale);
+          photo.weight = votes.weight;
+          why.photos.push_back(std::move(photo));
+        });
+    const Tally around = around_pixel(tallies_of(question.frame, grid, scale), first, question.x,
+                                      question.y, options.smooth_radius);
+    if (around.points > 0) why.votes = static_cast<double>(around.count / around.points);
+    if (around.weight > 0) why.through_share = static_cast<double>(around.through / around.weight);
+    return why;
   }
 
  private:
@@ -340,18 +285,25 @@ class Direction {
     }
   }
 
-  // visit(pair, near, far, z) for each photo that has testimony at the point's projection.
+  // visit(k, testimony) for each photo that is asked about this frame.
   template <typename Visit>
-  void for_each_witness(int frame, const Eigen::Vector3f& x, Visit&& visit) const {
+  void for_each_witness(int frame, const Eigen::Vector3f& x, float tolerance_sigmas,
+                        Visit&& visit) const {
     const size_t i = static_cast<size_t>(frame);
     for (size_t k = 0; k < views_[i].size(); ++k) {
-      size_t pixel = 0;
-      float z = 0;
-      if (!pairs_[i][k](x, pixel, z)) continue;
-      pixel += static_cast<size_t>(views_[i][k]) * witness_.epoch->pixels_per_frame();
-      if (witness_.far[pixel] > 0)
-        visit(pairs_[i][k], witness_.near[pixel], witness_.far[pixel], z);
+      const size_t first = static_cast<size_t>(views_[i][k]) * witness_.epoch->pixels_per_frame();
+      visit(k, ask(pairs_[i][k], &witness_.near[first], &witness_.far[first], x, tolerance_sigmas));
     }
+  }
+
+  // The fused votes of each pixel of a frame; no points where a pixel may not testify.
+  std::vector<Tally> tallies_of(int frame, const VoteGrid& grid, const Scale& scale) const {
+    std::vector<Tally> tallies(judged_.pixels_per_frame());
+    const size_t first = static_cast<size_t>(frame) * judged_.pixels_per_frame();
+    for_each_point(frame, 1, [&](size_t pixel, const Eigen::Vector3f& x) {
+      tallies[pixel - first] = Tally(grid.at(x), scale);
+    });
+    return tallies;
   }
 
   size_t index(int u, int v) const {
@@ -380,7 +332,7 @@ class Direction {
   const Witness& witness_;
   std::vector<std::vector<int>> views_;
   float min_confidence_;
-  std::vector<std::vector<Projection>> pairs_;  // [frame][k], with views_[frame][k]
+  std::vector<std::vector<PairProjection>> pairs_;  // [frame][k], with views_[frame][k]
 };
 
 // The majority of the judged labels (unchanged, changed) in the window; a single pixel is noise.
@@ -413,6 +365,12 @@ void median_filter(std::vector<ChangeLabel>& labels, const Reconstruction& r, Ch
       }
     }
   });
+}
+
+size_t pixel_index(const Reconstruction& r, const PixelQuestion& question) {
+  return static_cast<size_t>(question.frame) * r.pixels_per_frame() +
+         static_cast<size_t>(question.y) * static_cast<size_t>(r.width) +
+         static_cast<size_t>(question.x);
 }
 
 double extent_of(const Reconstruction& after) {
@@ -464,7 +422,8 @@ void FreeSpaceOptions::validate() const {
 
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
-                                   double registration_sigma_u, ProgressSink& progress) {
+                                   double registration_sigma_u, ProgressSink& progress,
+                                   const PixelQuestion* question) {
   options.validate();
   ProgressStage stage(progress, "free-space change");
   FreeSpaceChange result;
@@ -496,11 +455,23 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
                     static_cast<float>(kUnitWeight * result.scene_extent_u / 4),
                     static_cast<float>(options.tolerance_sigmas), registration_sigma_u};
   const double voxel_size = result.scene_extent_u / options.fusion_grid;
-  result.t1 = t1.labels(*t1.vote(scale, voxel_size), ChangeLabel::kRemoved, scale, options);
+  const auto judge = [&](const Direction& direction, const Reconstruction& epoch,
+                         ChangeLabel changed, EpochFreeSpace& judged) {
+    const auto grid = direction.vote(scale, voxel_size);
+    judged = direction.labels(*grid, changed, scale, options);
+    median_filter(judged.label, epoch, changed, options.median_radius_px);
+    if (!question || question->in_after != (changed == ChangeLabel::kAdded)) return;
+    PixelExplanation why = direction.explain(*question, *grid, scale, options);
+    const size_t pixel = pixel_index(epoch, *question);
+    why.label = judged.label[pixel];
+    why.confidence = judged.confidence[pixel];
+    why.gap_u = judged.gap[pixel];
+    why.level_of_detection_u = judged.level_of_detection[pixel];
+    result.explanation = std::move(why);
+  };
+  judge(t1, before, ChangeLabel::kRemoved, result.t1);
   stage.advance(0.6);
-  result.t2 = t2.labels(*t2.vote(scale, voxel_size), ChangeLabel::kAdded, scale, options);
-  median_filter(result.t1.label, before, ChangeLabel::kRemoved, options.median_radius_px);
-  median_filter(result.t2.label, after, ChangeLabel::kAdded, options.median_radius_px);
+  judge(t2, after, ChangeLabel::kAdded, result.t2);
   return result;
 }
 

@@ -5,11 +5,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
 #include "vggtcd/change/change_label.h"
+#include "vggtcd/change/explanation.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
@@ -85,6 +87,7 @@ struct FreeSpaceChange {
   double gap_sigma = 0;        // median over the pairs of photos of their relative sigma
   double surface_sigma_u = 0;  // the same at the median depth, T2 units
   double scene_extent_u = 0;   // T2
+  std::optional<PixelExplanation> explanation;  // of the pixel that was asked about
 };
 
 // Lets the labels decide: moves them into the distance result, where pixels without a score have no
@@ -100,9 +103,11 @@ void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes);
 //   otherwise the photo sees X's surface, a vote against.
 // Near photos weigh more, as 1 / z. Votes are summed over the points of a voxel, so photos of one
 // epoch agree, and over the surface around a pixel. registration_sigma_u: see level_of_detection.
+// question: a pixel whose votes are kept in `explanation`.
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
                                    double registration_sigma_u = 0,
-                                   ProgressSink& progress = silent_progress());
+                                   ProgressSink& progress = silent_progress(),
+                                   const PixelQuestion* question = nullptr);
 
 }  // namespace vggtcd

@@ -58,6 +58,10 @@ void add_detect(Program& program) {
     }
     fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
                outcome.moved);
+    if (outcome.explanation) {
+      fmt::print("{}\n{}", explanation_sentence(*outcome.explanation),
+                 explanation_table(*outcome.explanation));
+    }
     fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
                arguments->options.page ? epochs.out + "/report.html, " : "",
                arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
@@ -92,6 +96,13 @@ void add_detect(Program& program) {
   add_fields(command, arguments->options.change, "Change");
   add_fields(command, arguments->options.free_space, "Change");
   add_fields(command, arguments->options.instances, "Instances");
+  command
+      ->add_option("--explain", arguments->options.explain,
+                   "Tell which photos of the other epoch voted how for one pixel, and write "
+                   "explain.json: X,Y,before/PHOTO or X,Y,after/PHOTO. PHOTO is its name or its "
+                   "number from 0; 0,0 is the top left pixel of the photo as it was analysed (its "
+                   "size is in summary.json; the overlays may be enlarged).")
+      ->group("Change");
   add_field(command, "overlays", arguments->options.overlays,
             "Write overlays/: each photo beside its changes.");
   add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");
@@ -101,7 +112,8 @@ void add_detect(Program& program) {
       "  vggt-cd detect before/ after/ -o out\n"
       "  vggt-cd detect before.mp4 'after/*.jpg' --frames 30 -o out\n"
       "  vggt-cd detect t1.npz after/ -o out\n"
-      "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n\n"
+      "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n"
+      "  vggt-cd detect t1.npz t2.npz --joint joint.npz --explain 120,88,after/3 -o out\n\n"
       "Photos: each side a folder, a pattern or a video; or one side a prediction file that holds "
       "its images. Without network\nweights they are reconstructed by COLMAP and plane-sweep "
       "depth, a fallback that refuses what it cannot place. Finished\nstages are kept in "

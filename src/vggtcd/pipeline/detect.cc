@@ -85,6 +85,18 @@ bool by_free_space(const EpochInputs& inputs, const DetectOptions& options) {
   return inputs.has_holes || method == AlignmentMethod::kAuto || method == AlignmentMethod::kRobust;
 }
 
+// Asked before the work starts, so that a question without an answer costs nothing.
+std::optional<PixelQuestion> question_of(const EpochInputs& inputs, const DetectOptions& options,
+                                         const Epochs& epochs) {
+  if (options.explain.empty()) return {};
+  if (!by_free_space(inputs, options)) {
+    throw_error(ErrorCode::kUsage,
+                "explain: photos vote only where free space decides, and here the distance does; "
+                "add --change-method free_space");
+  }
+  return parse_pixel_question(options.explain, epochs.before, epochs.after);
+}
+
 // The uncertainty of the registration where it is known: the mean over the axes of the
 // translation's variance (of the pivot, near the middle of the scene); 0 if only the paper's stages
 // ran.
@@ -107,6 +119,7 @@ void DetectOptions::validate() const {
   change.validate();
   free_space.validate();
   instances.validate();
+  if (!explain.empty()) check_pixel_question(explain);
   report.validate();
 }
 
@@ -122,6 +135,8 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   Json summary = summary_head("detect", inputs, epochs);
   if (!inputs.origin.empty()) summary["reconstruction"] = inputs.origin;
 
+  const std::optional<PixelQuestion> question = question_of(inputs, options, epochs);
+
   // 2. Align: coarse, fine.
   outcome.alignment = align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
   const Sim3& t2_from_t1 = outcome.alignment.t2_from_t1;
@@ -134,10 +149,12 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   });
   if (by_free_space(inputs, options)) {
     log.run("free-space votes", [&](ProgressStage&) {
-      decide_by_labels(
+      FreeSpaceChange votes =
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
-                             registration_sigma_u(outcome.alignment)),
-          changes);
+                             registration_sigma_u(outcome.alignment), silent_progress(),
+                             question ? &*question : nullptr);
+      outcome.explanation = std::move(votes.explanation);
+      decide_by_labels(std::move(votes), changes);
     });
   }
   ChangeInstances instances;
@@ -163,6 +180,9 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
     write_cameras(aside, epochs.before, epochs.after, t2_from_t1);
     write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances);
     write_change_list(aside, instances, epochs.before, epochs.after, changes);
+    if (outcome.explanation) {
+      write_json_file(aside / "explain.json", explanation_json(*outcome.explanation));
+    }
     stage.advance(0.2);
     write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes);
     stage.advance(0.4);

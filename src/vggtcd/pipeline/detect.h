@@ -41,6 +41,7 @@ struct DetectOptions {
   ChangeOptions change;
   FreeSpaceOptions free_space;
   InstanceOptions instances;
+  std::string explain;  // X,Y,PHOTO (explanation.h); empty: nothing to explain
   bool overlays = true;
   bool page = true;
   ReportOptions report;
@@ -57,6 +58,8 @@ struct DetectOptions {
     field("change", self.change, "");
     field("free_space", self.free_space, "");
     field("instances", self.instances, "");
+    field("explain", self.explain,
+          "Tell which photos voted how for one pixel: X,Y,before/PHOTO or X,Y,after/PHOTO.");
     field("overlays", self.overlays, "Write overlays/: each photo beside its changes.");
     field("page", self.page, "Write report.html: everything in one page.");
     field("report", self.report, "");
@@ -73,6 +76,7 @@ struct DetectOutcome {
   int64_t points_t2 = 0, changed_t2 = 0;
   int64_t unobserved_t1 = 0, unobserved_t2 = 0;  // of the points; known with free-space votes only
   int64_t removed = 0, added = 0, moved = 0;     // things
+  std::optional<PixelExplanation> explanation;   // of the pixel that options.explain names
 };
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress);

@@ -149,6 +149,40 @@ Json change_json(const ChangeSet& changes) {
           {"t2", epoch_change_json(changes.t2)}};
 }
 
+Json explanation_json(const PixelExplanation& why) {
+  const auto number = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
+  Json json = {{"photo", why.photo},
+               {"frame", why.question.frame},
+               {"pixel", {why.question.x, why.question.y}},
+               {"sentence", explanation_sentence(why)},
+               {"label", enum_to_string(why.label)},
+               {"voted_itself", why.voted},
+               {"votes", why.votes},
+               {"through_share", number(why.through_share)},
+               {"min_through_share", why.min_through_share},
+               {"confidence", number(static_cast<double>(why.confidence))},
+               {"gap_u", number(static_cast<double>(why.gap_u))},
+               {"level_of_detection_u", number(static_cast<double>(why.level_of_detection_u))},
+               {"photos", Json::array()}};
+  for (const PhotoTestimony& photo : why.photos) {
+    const Testimony& said = photo.said;
+    Json line = {
+        {"photo", photo.photo}, {"vote", enum_to_string(said.vote)}, {"weight", photo.weight}};
+    if (said.vote != Vote::kOutside) {
+      line["pixel"] = {photo.x, photo.y};
+      line["depth_u"] = said.z;
+    }
+    if (said.far > 0) {
+      line["nearest_u"] = said.near;
+      line["farthest_u"] = said.far;
+      line["gap_u"] = said.gap_u;
+      if (said.sigma_u > 0) line["sigma_u"] = said.sigma_u;
+    }
+    json["photos"].push_back(line);
+  }
+  return json;
+}
+
 Json stages_json(const StageLog& log) {
   Json json = Json::array();
   for (const StageRecord& record : log.records()) {

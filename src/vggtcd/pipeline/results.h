@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "vggtcd/change/explanation.h"
 #include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/io/json_file.h"
@@ -22,6 +23,9 @@ Json alignment_json(const Alignment& alignment);
 
 // The "change" part: thresholds and counts.
 Json change_json(const ChangeSet& changes);
+
+// explain.json: which photos voted how for one pixel.
+Json explanation_json(const PixelExplanation& explanation);
 
 // The "stages" part.
 Json stages_json(const StageLog& log);

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a photo of the other epoch says about a point: the window maps.
+#include "vggtcd/change/witness.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/order_statistics.h"
+
+namespace vggtcd {
+
+float confidence_rank(const Reconstruction& r, double share) {
+  std::vector<float> values;
+  values.reserve(r.num_pixels());
+  for (size_t i = 0; i < r.num_pixels(); ++i) {
+    if (r.depth[i] > 0) values.push_back(r.confidence[i]);
+  }
+  if (values.empty())
+    throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
+                r.num_frames());
+  const double percents[] = {100 * share};
+  return static_cast<float>(percentiles(values, percents)[0]);
+}
+
+Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence) {
+  Witness witness;
+  witness.epoch = &epoch;
+  for (const View& view : epoch.views) {
+    witness.camera_from_t2.push_back(camera_from_new_world(view.camera_from_world, t2_from_epoch));
+  }
+  witness.near.resize(epoch.num_pixels());
+  witness.far.resize(epoch.num_pixels());
+  const int height = epoch.height, width = epoch.width;
+  parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
+    const size_t first = static_cast<size_t>(frame) * epoch.pixels_per_frame();
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width; ++u) {
+        float lo = std::numeric_limits<float>::max(), hi = 0;
+        for (int y = std::max(0, v - 1); y <= std::min(height - 1, v + 1); ++y) {
+          for (int x = std::max(0, u - 1); x <= std::min(width - 1, u + 1); ++x) {
+            const size_t i = first + static_cast<size_t>(y) * static_cast<size_t>(width) +
+                             static_cast<size_t>(x);
+            if (!testifies(epoch, i, min_confidence)) continue;
+            lo = std::min(lo, epoch.depth[i]);
+            hi = std::max(hi, epoch.depth[i]);
+          }
+        }
+        const size_t i =
+            first + static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
+        const float scale = static_cast<float>(t2_from_epoch.scale);
+        witness.near[i] = lo * scale;
+        witness.far[i] = hi * scale;
+      }
+    }
+  });
+  return witness;
+}
+
+std::span<const EnumName<Vote>> enum_names(Vote) {
+  static constexpr EnumName<Vote> kNames[] = {{Vote::kLooksThrough, "looks_through"},
+                                              {Vote::kSees, "sees"},
+                                              {Vote::kHidden, "hidden"},
+                                              {Vote::kOutside, "outside"},
+                                              {Vote::kNoTestimony, "no_testimony"}};
+  return kNames;
+}
+
+}  // namespace vggtcd

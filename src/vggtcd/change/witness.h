@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a photo of the other epoch says about a point: the window maps its depths are kept in, the
+// projection into it, and the one rule that makes a vote of both.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "vggtcd/change/pair_alignment.h"
+#include "vggtcd/core/options.h"
+#include "vggtcd/geometry/sim3.h"
+#include "vggtcd/scene/reconstruction.h"
+
+namespace vggtcd {
+
+// An epoch with everything that a point of the other one is held against, in the common frame T2.
+struct Witness {
+  const Reconstruction* epoch = nullptr;
+  std::vector<Rigid3> camera_from_t2;  // depths in T2 units
+  // [S, H, W] T2 units: extremes of the 3 x 3 window; far 0: no testimony
+  std::vector<float> near, far;
+};
+
+// The confidence below which this share of an epoch's pixels lies. Throws Error{kDegenerate} if no
+// pixel has depth.
+float confidence_rank(const Reconstruction& r, double share);
+
+// A pixel may testify, and be judged, if it has depth and is not among the least confident.
+inline bool testifies(const Reconstruction& r, size_t pixel, float min_confidence) {
+  return r.depth[pixel] > 0 && r.confidence[pixel] >= min_confidence;
+}
+
+Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence);
+
+// The projection of a pair of photos as floats, for the inner loop.
+struct PairProjection {
+  Eigen::Matrix3f matrix;
+  Eigen::Vector3f offset;
+  float sigma = 0;  // relative, of the gaps of the pair; 0: gives no testimony
+  int width, height;
+
+  PairProjection(const PairAlignment& pair, const Pinhole& pinhole, double sigma_of_pair)
+      : matrix((pinhole.matrix() * pair.matrix).cast<float>()),
+        offset((pinhole.matrix() * pair.offset).cast<float>()),
+        sigma(static_cast<float>(sigma_of_pair)),
+        width(pinhole.width),
+        height(pinhole.height) {}
+
+  // The pixel index within the frame and the depth; false if the point is outside the photo.
+  bool operator()(const Eigen::Vector3f& x, size_t& pixel, float& depth) const {
+    const Eigen::Vector3f h = matrix * x + offset;
+    depth = h.z();
+    if (!(depth > 0)) return false;
+    const float u = h.x() / depth + 0.5f, v = h.y() / depth + 0.5f;
+    if (!(u >= 0 && v >= 0 && u < static_cast<float>(width) && v < static_cast<float>(height)))
+      return false;
+    pixel = static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
+    return true;
+  }
+};
+
+enum class Vote : uint8_t {
+  kLooksThrough,  // a vote for change
+  kSees,          // the point's surface: a vote against
+  kHidden,        // behind something: no vote
+  kOutside,       // of the photo: no vote
+  kNoTestimony    // no depth that may testify there, or the pair disagrees too much: no vote
+};
+std::span<const EnumName<Vote>> enum_names(Vote);
+
+// One photo about one point. T2 units.
+struct Testimony {
+  Vote vote = Vote::kOutside;
+  size_t pixel = 0;         // of the photo, where the point falls
+  float z = 0;              // depth of the point there
+  float near = 0, far = 0;  // of the 3 x 3 window; far 0: nothing there may testify
+  float gap_u = 0;          // signed: how far the photo sees beyond the point
+  float sigma_u = 0;        // of the gaps of this pair at this depth
+};
+
+// The rule, with t = tolerance_sigmas * sigma * z: near - z > t looks through, z - far > t hidden,
+// otherwise the surface is seen. near and far are the photo's [H, W] of a Witness, x is in T2.
+inline Testimony ask(const PairProjection& pair, const float* near, const float* far,
+                     const Eigen::Vector3f& x, float tolerance_sigmas) {
+  Testimony said;
+  if (!pair(x, said.pixel, said.z)) return said;
+  said.vote = Vote::kNoTestimony;
+  said.near = near[said.pixel];
+  said.far = far[said.pixel];
+  said.sigma_u = pair.sigma * said.z;
+  if (!(said.far > 0)) return said;
+  said.gap_u =
+      said.z < said.near ? said.near - said.z : (said.z > said.far ? said.far - said.z : 0.0f);
+  if (!(said.sigma_u > 0)) return said;
+  const float tolerance = tolerance_sigmas * said.sigma_u;
+  said.vote = said.z - said.far > tolerance ? Vote::kHidden
+              : said.gap_u > tolerance      ? Vote::kLooksThrough
+                                            : Vote::kSees;
+  return said;
+}
+
+}  // namespace vggtcd
