@@ -62,6 +62,12 @@ class CubeTable {
 
   std::vector<Cube>& cubes() { return cubes_; }
 
+  // The cube of this number or nullptr.
+  const Cube* find_cube(const Voxel& number) const {
+    const Slot& slot = slots_[place_of(number)];
+    return slot.cube == 0 ? nullptr : &cubes_[slot.cube - 1];
+  }
+
   // Calls visit(number, cube) for every cube.
   template <typename Visit>
   void for_each(const Visit& visit) const {
@@ -88,11 +94,13 @@ class CubeTable {
     bits = (bits ^ bits >> 29) * 0xBF58476D1CE4E5B9u;
     return static_cast<size_t>(bits >> 32) & (slots_.size() - 1);
   }
-  Slot& find(const Voxel& number) {
+  // Where the slot of this number is, or the free one where it would be.
+  size_t place_of(const Voxel& number) const {
     size_t i = first_slot(number);
     while (slots_[i].cube != 0 && slots_[i].number != number) i = (i + 1) & (slots_.size() - 1);
-    return slots_[i];
+    return i;
   }
+  Slot& find(const Voxel& number) { return slots_[place_of(number)]; }
   void grow() {
     const LargeArray<Slot> old = std::exchange(slots_, zeroed(2 * slots_.size()));
     for (const Slot& slot : old) {
@@ -176,6 +184,34 @@ void enter(const CubeTable& other, CubeTable& table) {
   });
 }
 
+// A grid of voxels that are either marked or not.
+class MarkedVoxels {
+ public:
+  MarkedVoxels(std::span<const Eigen::Vector3f> positions, std::span<const uint32_t> members,
+               double voxel_size)
+      : voxel_size_(voxel_size) {
+    for (const uint32_t i : members) {
+      const Voxel voxel = voxel_of(positions[i]);
+      table_.cubes()[table_.find_or_add(cube_of(voxel))].best[place_in_cube(voxel)] = 1;
+    }
+  }
+  bool has(const Eigen::Vector3f& x) const {
+    const Voxel voxel = voxel_of(x);
+    const Cube* cube = table_.find_cube(cube_of(voxel));
+    return cube != nullptr && cube->best[place_in_cube(voxel)] != 0;
+  }
+
+ private:
+  Voxel voxel_of(const Eigen::Vector3f& x) const {
+    std::array<int32_t, 3> numbers;
+    voxel_numbers({x.data(), 3}, voxel_size_, numbers.data());
+    return {numbers[0], numbers[1], numbers[2]};
+  }
+
+  double voxel_size_;
+  CubeTable table_;
+};
+
 // The indices of the best points, in ascending order without sorting: one bit per point, then
 // collected.
 std::vector<uint32_t> best_points(std::span<const Cube> cubes, size_t num_points) {
@@ -218,6 +254,26 @@ std::vector<uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> position
       });
   for (size_t worker = 1; worker < tables.size(); ++worker) enter(tables[worker], tables[0]);
   return best_points(tables[0].cubes(), positions.size());
+}
+
+std::vector<uint32_t> points_in_voxels_of(std::span<const Eigen::Vector3f> positions,
+                                          std::span<const uint32_t> members, double voxel_size) {
+  check(positions.size() < std::numeric_limits<uint32_t>::max(), "points_in_voxels_of: < 2^32");
+  check(voxel_size > 0 && std::isfinite(voxel_size), "points_in_voxels_of: voxel_size > 0");
+  if (members.empty()) return {};
+  const MarkedVoxels marked(positions, members, voxel_size);
+  constexpr int64_t kGrain = 1 << 16;
+  const auto count = static_cast<int64_t>(positions.size());
+  std::vector<std::vector<uint32_t>> of_chunk(static_cast<size_t>(num_chunks(count, kGrain)));
+  parallel_for(count, kGrain, [&](int64_t begin, int64_t end) {
+    std::vector<uint32_t>& found = of_chunk[static_cast<size_t>(begin / kGrain)];
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      if (marked.has(positions[i])) found.push_back(static_cast<uint32_t>(i));
+    }
+  });
+  std::vector<uint32_t> result;
+  for (const auto& found : of_chunk) result.insert(result.end(), found.begin(), found.end());
+  return result;
 }
 
 }  // namespace vggtcd

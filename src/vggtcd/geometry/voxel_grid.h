@@ -18,4 +18,9 @@ namespace vggtcd {
 std::vector<uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> positions,
                                        std::span<const float> confidence, double voxel_size);
 
+// The indices, ascending, of all points that lie in the voxel of one of `members` (indices of
+// points, in any order; they are among the result). The same voxels and the same errors.
+std::vector<uint32_t> points_in_voxels_of(std::span<const Eigen::Vector3f> positions,
+                                          std::span<const uint32_t> members, double voxel_size);
+
 }  // namespace vggtcd

@@ -58,6 +58,29 @@ TEST_P(VoxelGrid, MatchesItsDefinitionAtEverySize) {
   }
 }
 
+TEST_P(VoxelGrid, PointsInTheVoxelsOfMembersMatchTheirDefinition) {
+  std::mt19937 random(2);
+  std::normal_distribution<float> normal;
+  Points positions(150'000);
+  for (auto& x : positions) x = {normal(random), normal(random), 0.1f * normal(random)};
+  std::vector<uint32_t> members;
+  for (int i = 0; i < 300; ++i) members.push_back(static_cast<uint32_t>(random() % 150'000));
+  for (const double size : {0.01, 0.2, 100.0}) {
+    const auto voxel = [&](uint32_t i) {
+      const Eigen::Array3d number = (positions[i].cast<double>().array() / size).floor();
+      return std::array{number.x(), number.y(), number.z()};
+    };
+    std::map<std::array<double, 3>, bool> marked;
+    for (const uint32_t i : members) marked[voxel(i)] = true;
+    std::vector<uint32_t> expected;
+    for (uint32_t i = 0; i < positions.size(); ++i) {
+      if (marked.contains(voxel(i))) expected.push_back(i);
+    }
+    EXPECT_EQ(points_in_voxels_of(positions, members, size), expected) << "voxel size " << size;
+  }
+  EXPECT_TRUE(points_in_voxels_of(positions, {}, 1).empty());
+}
+
 INSTANTIATE_TEST_SUITE_P(Threads, VoxelGrid, ::testing::Values(1, 2, 5));
 
 TEST(VoxelDownsample, KeepsTheMostConfidentAndOfEqualsTheFirst) {

@@ -6,9 +6,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <utility>
+#include <numeric>
+#include <vector>
 
+#include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 
 namespace vggtcd {
@@ -60,16 +61,54 @@ class Witnesses {
 };
 
 struct Block {
+  bool empty = true;
   Matrix7 information = Matrix7::Zero();
   Vector7 gradient = Vector7::Zero();
 };
 
+// What pairs say about the parameters, summed up by block in the order of the pairs: the same bits
+// for any number of threads. block_of(pair) is below num_blocks.
+template <typename BlockOf>
+std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t num_blocks,
+                                const BlockOf& block_of, const Eigen::Vector3d& pivot,
+                                double sigma) {
+  // The pairs in the order of their blocks, by counting.
+  std::vector<size_t> starts(num_blocks + 1, 0);
+  for (const SurfacePair& pair : pairs) ++starts[block_of(pair) + 1];
+  std::partial_sum(starts.begin(), starts.end(), starts.begin());
+  std::vector<uint32_t> order(pairs.size());
+  std::vector<size_t> next(starts.begin(), starts.end() - 1);
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    order[next[block_of(pairs[i])]++] = static_cast<uint32_t>(i);
+  }
+  std::vector<Block> blocks(num_blocks);
+  const auto add = [&](const SurfacePair& pair, Block& block) {
+    const double residual = pair.plane_residual();
+    const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
+    if (weight == 0) return;
+    const Eigen::Vector3d arm = pair.moving - pivot;
+    Vector7 jacobian;
+    jacobian << arm.cross(pair.normal), pair.normal, pair.normal.dot(arm);
+    block.information += weight * jacobian * jacobian.transpose();
+    block.gradient += weight * residual * jacobian;
+    block.empty = false;
+  };
+  constexpr int64_t kGrain = 16;
+  parallel_for(static_cast<int64_t>(num_blocks), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {
+      for (size_t i = starts[b]; i < starts[b + 1]; ++i) add(pairs[order[i]], blocks[b]);
+    }
+  });
+  return blocks;
+}
+
 Eigen::Index at(int block) { return 7 * Eigen::Index{block}; }
 
-// Unknowns: theta, the photos of T1, the photos of T2; all but theta are eliminated.
-SurfaceEquations marginalise(const std::map<std::pair<int, int>, Block>& blocks,
-                             const Witnesses& of_t1, const Witnesses& of_t2,
-                             const Eigen::Vector3d& pivot, const FrameSpread& spread) {
+// Unknowns: theta, the photos of T1, the photos of T2; all but theta are eliminated. Block
+// i * (photos of T2) + j holds the pairs of photos i and j.
+SurfaceEquations marginalise(const std::vector<Block>& blocks, const Witnesses& of_t1,
+                             const Witnesses& of_t2, const Eigen::Vector3d& pivot,
+                             const FrameSpread& spread) {
   const int n1 = of_t1.count(), total = n1 + of_t2.count();
   Eigen::MatrixXd photos = Eigen::MatrixXd::Zero(at(total), at(total));
   Eigen::MatrixXd coupling = Eigen::MatrixXd::Zero(at(total), 7);
@@ -77,11 +116,15 @@ SurfaceEquations marginalise(const std::map<std::pair<int, int>, Block>& blocks,
   const Matrix7 prior = spread.covariance().inverse();
   for (int k = 0; k < total; ++k) photos.block<7, 7>(at(k), at(k)) = prior;
   SurfaceEquations result;
-  for (const auto& [pair, block] : blocks) {
-    const Eigen::Index i = at(pair.first), j = at(n1 + pair.second);
+  for (size_t k = 0; k < blocks.size(); ++k) {
+    const Block& block = blocks[k];
+    if (block.empty) continue;
+    const int photo1 = static_cast<int>(k) / of_t2.count();
+    const int photo2 = static_cast<int>(k) % of_t2.count();
+    const Eigen::Index i = at(photo1), j = at(n1 + photo2);
     // A photo's similarity about its own centre, as parameters about the pivot.
-    const Matrix7 a = pivot_change(pivot - of_t1.center(pair.first));
-    const Matrix7 b = pivot_change(pivot - of_t2.center(pair.second));
+    const Matrix7 a = pivot_change(pivot - of_t1.center(photo1));
+    const Matrix7 b = pivot_change(pivot - of_t2.center(photo2));
     const Matrix7 ha = block.information * a, hb = block.information * b;
     result.information += block.information;
     result.gradient += block.gradient;
@@ -120,24 +163,18 @@ SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
   const double sigma = residual_sigma(pairs, min_sigma_u);
   const Witnesses of_t1(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
   const Witnesses of_t2(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
-  std::map<std::pair<int, int>, Block> blocks;
-  Block independent;
-  for (const SurfacePair& pair : pairs) {
-    const double residual = pair.plane_residual();
-    const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
-    if (weight == 0) continue;
-    const Eigen::Vector3d arm = pair.moving - pivot;
-    Vector7 jacobian;
-    jacobian << arm.cross(pair.normal), pair.normal, pair.normal.dot(arm);
-    Block& block =
-        frame_spread ? blocks[{of_t1.of(pair.frame_t1), of_t2.of(pair.frame_t2)}] : independent;
-    block.information += weight * jacobian * jacobian.transpose();
-    block.gradient += weight * residual * jacobian;
-  }
   SurfaceEquations result;
   if (frame_spread) {
+    const int n1 = of_t1.count(), n2 = of_t2.count();
+    const auto block_of = [&](const SurfacePair& pair) {
+      return static_cast<size_t>(of_t1.of(pair.frame_t1) * n2 + of_t2.of(pair.frame_t2));
+    };
+    const std::vector<Block> blocks =
+        sum_by_block(pairs, static_cast<size_t>(n1 * n2), block_of, pivot, sigma);
     result = marginalise(blocks, of_t1, of_t2, pivot, *frame_spread);
   } else {
+    const Block independent = sum_by_block(
+        pairs, 1, [](const SurfacePair&) { return size_t{0}; }, pivot, sigma)[0];
     result.information = independent.information;
     result.gradient = independent.gradient;
   }

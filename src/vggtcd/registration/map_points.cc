@@ -2,15 +2,19 @@
 // Points of one frame in another.
 #include "vggtcd/registration/map_points.h"
 
+#include "vggtcd/core/parallel.h"
+
 namespace vggtcd {
 
 std::vector<Eigen::Vector3f> map_points(const Sim3& b_from_a,
                                         const std::vector<Eigen::Vector3f>& points_in_a) {
-  std::vector<Eigen::Vector3f> points_in_b;
-  points_in_b.reserve(points_in_a.size());
-  for (const Eigen::Vector3f& x : points_in_a) {
-    points_in_b.push_back((b_from_a * x.cast<double>()).cast<float>());
-  }
+  std::vector<Eigen::Vector3f> points_in_b(points_in_a.size());
+  constexpr int64_t kGrain = 1 << 14;
+  parallel_for(static_cast<int64_t>(points_in_a.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      points_in_b[i] = (b_from_a * points_in_a[i].cast<double>()).cast<float>();
+    }
+  });
   return points_in_b;
 }
 

@@ -30,27 +30,29 @@ double median_of(const std::vector<SurfacePair>& pairs, double (*value)(const Su
   return values.empty() ? 0 : static_cast<double>(median(values));
 }
 
-struct StaticPairs {
-  std::vector<SurfacePair> pairs;
-  int64_t rejected_far = 0;
-  int64_t rejected_normal = 0;
+struct Rejected {
+  int64_t far = 0;
+  int64_t normal = 0;
 };
 
-// The gates: near in medians of the distance, and surfaces that face the same way.
-StaticPairs static_pairs(const std::vector<SurfacePair>& all, const RobustOptions& options) {
+// The gates: near in medians of the distance, and surfaces that face the same way. Leaves the
+// static pairs, in their order.
+Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& options) {
   const double limit = options.static_distance *
-                       median_of(all, [](const SurfacePair& pair) { return pair.distance; });
-  StaticPairs result;
-  for (const SurfacePair& pair : all) {
+                       median_of(pairs, [](const SurfacePair& pair) { return pair.distance; });
+  Rejected rejected;
+  std::erase_if(pairs, [&](const SurfacePair& pair) {
     if (pair.distance > limit) {
-      ++result.rejected_far;
-    } else if (pair.normal_cosine < options.min_normal_cosine) {
-      ++result.rejected_normal;
-    } else {
-      result.pairs.push_back(pair);
+      ++rejected.far;
+      return true;
     }
-  }
-  return result;
+    if (pair.normal_cosine < options.min_normal_cosine) {
+      ++rejected.normal;
+      return true;
+    }
+    return false;
+  });
+  return rejected;
 }
 
 std::string describe_direction(const Vector7& direction) {
@@ -177,15 +179,16 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   const Matrix7 prior_information = prior_covariance.inverse();
 
   const SurfaceMatcher matcher(t1, t2);
+  std::vector<SurfacePair> pairs;
   Sim3 current = initial_t2_from_t1;
   Matrix7 surface_information = Matrix7::Zero();
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    const StaticPairs gated =
-        static_pairs(matcher.pairs(current, options.both_directions), options);
-    result.pairs = static_cast<int64_t>(gated.pairs.size());
-    result.rejected_far = gated.rejected_far;
-    result.rejected_normal = gated.rejected_normal;
+    matcher.pairs(current, options.both_directions, pairs);
+    const Rejected rejected = keep_static(pairs, options);
+    result.pairs = static_cast<int64_t>(pairs.size());
+    result.rejected_far = rejected.far;
+    result.rejected_normal = rejected.normal;
     if (result.pairs < options.min_pairs) {
       result.explanation = fmt::format(
           "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
@@ -194,7 +197,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
       return result;
     }
     const SurfaceEquations surface = surface_equations(
-        gated.pairs, result.pivot_in_t2, options.frame_errors ? &result.uncertainty.frame : nullptr,
+        pairs, result.pivot_in_t2, options.frame_errors ? &result.uncertainty.frame : nullptr,
         kSigmaFloor * result.extent_u);
     result.residual_sigma_u = surface.sigma_u;
     surface_information = surface.information;
@@ -210,10 +213,12 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   }
   report_uncertainty(surface_information, prior_covariance, result);
 
-  result.cost_initial = cost_of(matcher.pairs(initial_t2_from_t1), result.residual_sigma_u,
-                                options.min_normal_cosine);
-  result.cost_final =
-      cost_of(matcher.pairs(current), result.residual_sigma_u, options.min_normal_cosine);
+  const auto cost_at = [&](const Sim3& t2_from_t1) {
+    matcher.pairs(t2_from_t1, true, pairs);
+    return cost_of(pairs, result.residual_sigma_u, options.min_normal_cosine);
+  };
+  result.cost_initial = cost_at(initial_t2_from_t1);
+  result.cost_final = cost_at(current);
   if (result.cost_final >= result.cost_initial) {
     result.verdict = RobustVerdict::kKeptInitialNotBetter;
     result.explanation = fmt::format(

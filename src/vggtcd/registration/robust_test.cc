@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "tests/support/toy_scene.h"
+#include "vggtcd/core/parallel.h"
 
 namespace vggtcd {
 namespace {
@@ -49,6 +50,22 @@ TEST(AlignRobust, RemovesAnErrorInAllSevenParameters) {
   EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
   EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
   EXPECT_LT(result.cost_final, result.cost_initial);
+}
+
+TEST(AlignRobust, HasTheSameBitsForAnyNumberOfThreads) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps_and_box, 0.13);
+  set_num_threads(1);
+  const RobustResult expected = align_robust(t1, t2, kError, {}, {});
+  for (const int threads : {2, 5}) {
+    set_num_threads(threads);
+    const RobustResult result = align_robust(t1, t2, kError, {}, {});
+    EXPECT_EQ(result.t2_from_t1.rotation, expected.t2_from_t1.rotation);
+    EXPECT_EQ(result.t2_from_t1.translation, expected.t2_from_t1.translation);
+    EXPECT_EQ(result.t2_from_t1.scale, expected.t2_from_t1.scale);
+    EXPECT_EQ(result.covariance, expected.covariance);
+    EXPECT_EQ(result.cost_final, expected.cost_final);
+  }
+  set_num_threads(2);
 }
 
 TEST(AlignRobust, IsNotDrawnByAChange) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "vggtcd/core/parallel.h"
 #include "vggtcd/registration/map_points.h"
 
 namespace vggtcd {
@@ -11,10 +12,15 @@ SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t
     : t1_(t1), t2_(t2), index_t1_(t1.positions), index_t2_(t2.positions) {}
 
 std::vector<SurfacePair> SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both) const {
-  const NearestNeighbors of_t1 = index_t2_.query(map_points(t2_from_t1, t1_.positions));
   std::vector<SurfacePair> result;
-  result.reserve(t1_.size() + t2_.size());
-  const auto add = [&](size_t i1, size_t i2, bool search_from_t1) {
+  pairs(t2_from_t1, both, result);
+  return result;
+}
+
+void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
+                           std::vector<SurfacePair>& result) const {
+  result.resize(t1_.size() + (both ? t2_.size() : 0));
+  const auto pair_of = [&](size_t i1, size_t i2, bool search_from_t1) {
     SurfacePair pair;
     pair.moving = t2_from_t1 * t1_.positions[i1].cast<double>();
     pair.fixed = t2_.positions[i2].cast<double>();
@@ -26,13 +32,22 @@ std::vector<SurfacePair> SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both
     pair.frame_t1 = t1_.frames[i1];
     pair.frame_t2 = t2_.frames[i2];
     pair.from_t1 = search_from_t1;
-    result.push_back(pair);
+    return pair;
   };
-  for (size_t i = 0; i < t1_.size(); ++i) add(i, static_cast<size_t>(of_t1.index[i]), true);
-  if (!both) return result;
+  constexpr int64_t kGrain = 1 << 13;
+  const NearestNeighbors of_t1 = index_t2_.query(map_points(t2_from_t1, t1_.positions));
+  parallel_for(static_cast<int64_t>(t1_.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      result[i] = pair_of(i, static_cast<size_t>(of_t1.index[i]), true);
+    }
+  });
+  if (!both) return;
   const NearestNeighbors of_t2 = index_t1_.query(map_points(t2_from_t1.inverse(), t2_.positions));
-  for (size_t i = 0; i < t2_.size(); ++i) add(static_cast<size_t>(of_t2.index[i]), i, false);
-  return result;
+  parallel_for(static_cast<int64_t>(t2_.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      result[t1_.size() + i] = pair_of(static_cast<size_t>(of_t2.index[i]), i, false);
+    }
+  });
 }
 
 }  // namespace vggtcd
