@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "vggtcd/core/parallel.h"
@@ -22,11 +23,13 @@ constexpr double kPairShare = 0.5;        // found from both sides
 constexpr int kMaxWitnesses = 48;
 
 double residual_sigma(const std::vector<SurfacePair>& pairs, double min_sigma_u) {
-  std::vector<float> residuals;
-  residuals.reserve(pairs.size());
-  for (const SurfacePair& pair : pairs) {
-    residuals.push_back(static_cast<float>(std::abs(pair.plane_residual())));
-  }
+  std::vector<float> residuals(pairs.size());
+  constexpr int64_t kGrain = 1 << 14;
+  parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      residuals[i] = static_cast<float>(std::abs(pairs[i].plane_residual()));
+    }
+  });
   if (residuals.empty()) return min_sigma_u;
   return std::max(min_sigma_u, kSigmaFromMad * static_cast<double>(median(residuals)));
 }
@@ -161,10 +164,14 @@ SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
                                    const Eigen::Vector3d& pivot, const FrameSpread* frame_spread,
                                    double min_sigma_u) {
   const double sigma = residual_sigma(pairs, min_sigma_u);
-  const Witnesses of_t1(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
-  const Witnesses of_t2(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
   SurfaceEquations result;
   if (frame_spread) {
+    std::optional<Witnesses> sides[2];  // at the same time
+    parallel_for(2, 1, [&](int64_t side, int64_t) {
+      if (side == 0) sides[0].emplace(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
+      if (side == 1) sides[1].emplace(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
+    });
+    const Witnesses &of_t1 = *sides[0], &of_t2 = *sides[1];
     const int n1 = of_t1.count(), n2 = of_t2.count();
     const auto block_of = [&](const SurfacePair& pair) {
       return static_cast<size_t>(of_t1.of(pair.frame_t1) * n2 + of_t2.of(pair.frame_t2));

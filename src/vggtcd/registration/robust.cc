@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/frame_equations.h"
@@ -24,9 +25,13 @@ constexpr double kWeakShare = 0.5;
 constexpr double kSigmaFloor = 1e-4;
 
 double median_of(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
-  std::vector<float> values;
-  values.reserve(pairs.size());
-  for (const SurfacePair& pair : pairs) values.push_back(static_cast<float>(value(pair)));
+  std::vector<float> values(pairs.size());
+  constexpr int64_t kGrain = 1 << 14;
+  parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      values[i] = static_cast<float>(value(pairs[i]));
+    }
+  });
   return values.empty() ? 0 : static_cast<double>(median(values));
 }
 
