@@ -44,6 +44,11 @@ void add_detect(Program& program) {
       fmt::print("{}\n", photos.explanation);
       inputs = photos.inputs;
     } else {
+      if (arguments->dry_run) {
+        throw_error(ErrorCode::kUsage,
+                    "--dry-run: plans the reconstruction of photos; {} and {} are predictions",
+                    epochs.before, epochs.after);
+      }
       inputs = epochs.inputs();
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
@@ -90,8 +95,8 @@ void add_detect(Program& program) {
   add_field(command, "change_method", arguments->options.change_method,
             "distance: changed is what is far from the other epoch's points, the paper's rule. "
             "free_space: changed is what the photos of the other epoch look through; what none of "
-            "them sees is unobserved. auto: free_space with --method robust and for photos without "
-            "a network, else distance.");
+            "them sees is unobserved. auto: distance with --method paper and coarse, else, and for "
+            "photos without a network, free_space.");
   command->get_option("--change-method")->group("Change");
   add_fields(command, arguments->options.change, "Change");
   add_fields(command, arguments->options.free_space, "Change");
@@ -120,9 +125,9 @@ void add_detect(Program& program) {
       "OUT/.stages: a job that was interrupted goes on, one that is repeated starts at the "
       "alignment.\n\n"
       "Reads the .npz files that VGGT, VGGT-Omega, MapAnything and Depth Anything 3 save. Writes "
-      "before_aligned.ply and after.ply\n(scalar fields change_distance, changed, confidence), "
-      "overlays/, change.npz, sim3.json, summary.json, cameras_*.tum and\na COLMAP model; "
-      "docs/formats.md describes them all.");
+      "report.html (everything in one\npage), before_aligned.ply and after.ply (scalar fields), "
+      "overlays/, changes.json and changes.csv (what changed, as things), change.npz,\nsim3.json, "
+      "summary.json, cameras_*.tum and a COLMAP model; docs/formats.md describes them all.");
 }
 
 }  // namespace vggtcd::cli

@@ -16,12 +16,28 @@ namespace {
   throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", path.string(), std::strerror(error));
 }
 
+// A long name is cut, because the suffix must fit into a name too; its hash tells it from others.
+std::string aside_name(const std::string& name) {
+  constexpr size_t kMaxBytes = 220;
+  if (name.size() <= kMaxBytes) return fmt::format("{}.partial-{}", name, getpid());
+  return fmt::format("{}.{:x}.partial-{}", name.substr(0, 180), std::hash<std::string>{}(name),
+                     getpid());
+}
+
 }  // namespace
 
-OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)), aside_(path_) {
-  // The process id keeps two programs writing the same file from mixing their bytes.
-  aside_ += fmt::format(".partial-{}", getpid());
+OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
+  // A link stays, its target is replaced; a device or a pipe would be.
+  if (std::filesystem::is_symlink(path_) && std::filesystem::exists(path_)) {
+    path_ = std::filesystem::canonical(path_);
+  }
   if (std::filesystem::is_directory(path_)) throw_cannot_write(path_, EISDIR);
+  if (std::filesystem::exists(path_) && !std::filesystem::is_regular_file(path_)) {
+    throw_error(ErrorCode::kOutput, "{}: expected a file to replace, found a device or a pipe",
+                path_.string());
+  }
+  // The process id keeps two programs writing the same file from mixing their bytes.
+  aside_ = path_.parent_path() / aside_name(path_.filename().string());
   file_ = std::fopen(aside_.c_str(), "wb");
   if (file_ == nullptr) throw_cannot_write(path_, errno);
 }

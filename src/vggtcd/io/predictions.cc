@@ -110,7 +110,9 @@ Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std:
 }
 
 // The photos' names, without directories. Results are named after them without the extension, so
-// names that are empty or not distinct then are of no use and are replaced like missing ones.
+// names that are empty, longer than a file's name may be, or not distinct then are of no use and
+// are replaced like missing ones.
+constexpr size_t kMaxStemBytes = 251;  // and four for .png
 std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout& layout) {
   std::vector<std::string> names;
   if (npz.has("names")) {
@@ -118,7 +120,9 @@ std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout
     for (const std::string& path : npz.read_strings("names")) {
       std::string name = path.substr(path.find_last_of("/\\") + 1);
       std::erase_if(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-      if (!name.empty() && name != "." && name != "..") names.push_back(name);
+      if (name.empty() || name == "." || name == "..") continue;
+      if (std::filesystem::path(name).stem().string().size() > kMaxStemBytes) continue;
+      names.push_back(name);
     }
   }
   std::set<std::string> stems;

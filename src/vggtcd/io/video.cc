@@ -3,6 +3,7 @@
 #include "vggtcd/io/video.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "vggtcd/core/error.h"
 #ifdef VGGTCD_WITH_VIDEO
@@ -27,6 +28,7 @@ Image image_of(const cv::Mat& bgr) {
 // Calls use(number, frame) for every frame; returns how many there are.
 template <typename Use>
 int for_each_frame(const std::string& path, const Use& use) {
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // we say ourselves what is wrong
   // One backend, not whichever OpenCV finds first: they count and seek frames differently.
   cv::VideoCapture video(path, cv::CAP_FFMPEG);
   int count = 0;
