@@ -9,6 +9,9 @@
 
 namespace vggtcd {
 
+// Throws Error{kUnavailable} ending in `remedy` if there is no such program in PATH.
+void require_program(const std::string& program, const std::string& remedy);
+
 // Runs arguments[0], looked up in PATH, and waits for it. Standard output and error are appended to
 // `log`; standard input is empty; QT_QPA_PLATFORM=offscreen, so that programs with a user
 // interface run without a display. Returns the exit status, or 128 + signal. Throws

@@ -254,6 +254,7 @@ std::string ClassicalReconstructor::fingerprint() const {
 }
 
 ReconstructionPlan ClassicalReconstructor::plan(const PhotoEpochs& photos) const {
+  require_colmap();
   ReconstructionPlan plan;
   plan.frames_before = static_cast<int>(photos.before.photos.size());
   plan.frames_after = static_cast<int>(photos.after.photos.size());
@@ -284,6 +285,7 @@ ReconstructionPlan ClassicalReconstructor::plan(const PhotoEpochs& photos) const
 
 std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const fs::path& folder,
                                                 ProgressSink& progress) const {
+  require_colmap();
   const int photos_t1 = static_cast<int>(photos.before.photos.size());
   const int photos_t2 = static_cast<int>(photos.after.photos.size());
   const fs::path work = folder / "work";

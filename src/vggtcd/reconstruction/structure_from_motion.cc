@@ -267,6 +267,8 @@ void SfmOptions::validate() const {
   check_field(min_pair_inliers >= 8, "min_pair_inliers", min_pair_inliers, "at least 8");
 }
 
+void require_colmap() { require_program("colmap", kRemedy); }
+
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const fs::path& scratch, ProgressSink& progress) {
   options.validate();

@@ -46,6 +46,9 @@ struct SfmResult {
   std::vector<Image> reduced;  // the photos that were given
 };
 
+// Before anything is read: throws Error{kUnavailable} with the remedy if COLMAP is missing.
+void require_colmap();
+
 // Features and matches by features.h, then COLMAP's incremental mapper as a child process with one
 // thread (its results depend on the number of threads). Cameras are SIMPLE_RADIAL, one for each
 // epoch and photo size; their focal lengths start at 1.2 and, where that leaves photos out, at 0.85
