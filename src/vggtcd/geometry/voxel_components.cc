@@ -58,8 +58,7 @@ VoxelComponents connected_components(std::span<const Eigen::Vector3f> positions,
   for (size_t i = 0; i < positions.size(); ++i) keys[i] = key_of(positions[i], voxel_size);
   std::vector<uint64_t> voxels = keys;
   std::ranges::sort(voxels);
-  const auto repeated = std::ranges::unique(voxels);
-  voxels.erase(repeated.begin(), repeated.end());
+  voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
   result.num_voxels = static_cast<uint32_t>(voxels.size());
 
   const auto number_of = [&](uint64_t key) -> int64_t {
