@@ -428,8 +428,8 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   ProgressStage stage(progress, "free-space change");
   FreeSpaceChange result;
   result.scene_extent_u = extent_of(after);
-  const float min_confidence_t1 = confidence_rank(before, options.min_confidence_rank);
-  const float min_confidence_t2 = confidence_rank(after, options.min_confidence_rank);
+  const float min_confidence_t1 = confidence_percentile(before, 100 * options.min_confidence_rank);
+  const float min_confidence_t2 = confidence_percentile(after, 100 * options.min_confidence_rank);
   const Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1);
   const Witness witness_t2 = make_witness(after, {}, min_confidence_t2);
   stage.advance(0.1);

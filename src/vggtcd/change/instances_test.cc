@@ -16,6 +16,8 @@
 namespace vggtcd {
 namespace {
 
+using testing_support::flat_relief;
+using testing_support::kT2FromT1;
 using testing_support::reconstruct;
 using testing_support::ToyScene;
 
@@ -23,15 +25,9 @@ using testing_support::ToyScene;
 bool in_square(double x, double y, double cx, double cy, double half) {
   return std::abs(x - cx) < half && std::abs(y - cy) < half;
 }
-double flat(double, double) { return 0.0; }
 double left_box(double x, double y) { return in_square(x, y, -0.9, 0, 0.3) ? 0.5 : 0.0; }
 double right_box(double x, double y) { return in_square(x, y, 0.9, 0, 0.3) ? 0.5 : 0.0; }
 double both_boxes(double x, double y) { return left_box(x, y) + right_box(x, y); }
-
-const Sim3 kT2FromT1{
-    1.7,
-    Eigen::AngleAxisd(0.8, Eigen::Vector3d(1, 1, 1).normalized()).toRotationMatrix(),
-    {3, 2, 1}};
 
 struct Case {
   Reconstruction before, after;
@@ -54,7 +50,7 @@ ChangeInstances instances_of(const Case& c, const InstanceOptions& options = {})
 }
 
 TEST(FindInstances, ABoxThatAppearedIsOneAddedThingWhereItStands) {
-  const Case c = make_case(flat, right_box);
+  const Case c = make_case(flat_relief, right_box);
   const ChangeInstances found = instances_of(c);
   ASSERT_EQ(found.instances.size(), 1u);
   const ChangeInstance& box = found.instances[0];
@@ -70,7 +66,7 @@ TEST(FindInstances, ABoxThatAppearedIsOneAddedThingWhereItStands) {
 }
 
 TEST(FindInstances, PixelsCarryTheIdOfTheirThingAndOnlyChangedPixelsDo) {
-  const Case c = make_case(flat, both_boxes);
+  const Case c = make_case(flat_relief, both_boxes);
   const ChangeInstances found = instances_of(c);
   ASSERT_EQ(found.instances.size(), 2u);
   std::vector<int64_t> pixels(3);
@@ -126,7 +122,7 @@ TEST(FindInstances, WithoutTheSameColoursNothingMoved) {
 }
 
 TEST(FindInstances, VolumeIsThatOfTheBoxWithinItsUncertaintyAndACell) {
-  const Case c = make_case(flat, right_box);
+  const Case c = make_case(flat_relief, right_box);
   const ChangeInstances found = instances_of(c);
   ASSERT_EQ(found.instances.size(), 1u);
   const InstancePart& part = *found.instances[0].after;
@@ -137,7 +133,7 @@ TEST(FindInstances, VolumeIsThatOfTheBoxWithinItsUncertaintyAndACell) {
 }
 
 TEST(FindInstances, TheBestPhotoShowsTheMostOfIt) {
-  const Case c = make_case(flat, right_box);
+  const Case c = make_case(flat_relief, right_box);
   const ChangeInstances found = instances_of(c);
   ASSERT_EQ(found.instances.size(), 1u);
   const size_t per_frame = c.after.pixels_per_frame();
@@ -149,7 +145,7 @@ TEST(FindInstances, TheBestPhotoShowsTheMostOfIt) {
 }
 
 TEST(FindInstances, ThingsBelowTheMinimumSizeAreLeftOut) {
-  const Case c = make_case(flat, right_box);
+  const Case c = make_case(flat_relief, right_box);
   EXPECT_FALSE(instances_of(c).instances.empty());
   EXPECT_TRUE(instances_of(c, {.min_size_fraction = 0.9}).instances.empty());
   EXPECT_TRUE(instances_of(c, {.min_width_fraction = 0.9}).instances.empty());
@@ -157,7 +153,7 @@ TEST(FindInstances, ThingsBelowTheMinimumSizeAreLeftOut) {
 }
 
 TEST(FindInstances, ThingsOfWhichTheVotesAreUnsureAreLeftOut) {
-  Case c = make_case(flat, right_box);
+  Case c = make_case(flat_relief, right_box);
   std::ranges::fill(c.changes.t2.confidence, 0.5f);
   EXPECT_TRUE(instances_of(c).instances.empty());
   EXPECT_FALSE(instances_of(c, {.min_confidence = 0.4}).instances.empty());

@@ -6,22 +6,8 @@
 #include <limits>
 
 #include "vggtcd/core/parallel.h"
-#include "vggtcd/geometry/order_statistics.h"
 
 namespace vggtcd {
-
-float confidence_rank(const Reconstruction& r, double share) {
-  std::vector<float> values;
-  values.reserve(r.num_pixels());
-  for (size_t i = 0; i < r.num_pixels(); ++i) {
-    if (r.depth[i] > 0) values.push_back(r.confidence[i]);
-  }
-  if (values.empty())
-    throw_error(ErrorCode::kDegenerate, "no pixel of any of the {} frames has depth",
-                r.num_frames());
-  const double percents[] = {100 * share};
-  return static_cast<float>(percentiles(values, percents)[0]);
-}
 
 Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence) {
   Witness witness;

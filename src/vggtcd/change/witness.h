@@ -23,10 +23,6 @@ struct Witness {
   std::vector<float> near, far;
 };
 
-// The confidence below which this share of an epoch's pixels lies. Throws Error{kDegenerate} if no
-// pixel has depth.
-float confidence_rank(const Reconstruction& r, double share);
-
 // A pixel may testify, and be judged, if it has depth and is not among the least confident.
 inline bool testifies(const Reconstruction& r, size_t pixel, float min_confidence) {
   return r.depth[pixel] > 0 && r.confidence[pixel] >= min_confidence;

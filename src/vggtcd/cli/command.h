@@ -89,4 +89,17 @@ void add_fields(CLI::App* command, Options& options, const std::string& group) {
   });
 }
 
+// The one field of this name, with the help that its options declare.
+template <typename Options>
+void add_field_of(CLI::App* command, Options& options, std::string_view wanted,
+                  const std::string& group) {
+  for_each_field(options, [&](std::string_view name, auto& field, std::string_view help) {
+    if constexpr (!requires { std::remove_reference_t<decltype(field)>::fields; }) {
+      if (name != wanted) return;
+      add_field(command, name, field, help);
+      command->get_option(flag_of(name))->group(group);
+    }
+  });
+}
+
 }  // namespace vggtcd::cli

@@ -92,12 +92,7 @@ void add_detect(Program& program) {
                  "Print the plan (frames, sizes, memory, time) and do nothing. Photos only.")
       ->group("Photos");
   add_fields(command, arguments->options.alignment, "Alignment");
-  add_field(command, "change_method", arguments->options.change_method,
-            "distance: changed is what is far from the other epoch's points, the paper's rule. "
-            "free_space: changed is what the photos of the other epoch look through; what none of "
-            "them sees is unobserved. auto: distance with --method paper and coarse, else, and for "
-            "photos without a network, free_space.");
-  command->get_option("--change-method")->group("Change");
+  add_field_of(command, arguments->options, "change_method", "Change");
   add_fields(command, arguments->options.change, "Change");
   add_fields(command, arguments->options.free_space, "Change");
   add_fields(command, arguments->options.instances, "Instances");
@@ -108,9 +103,8 @@ void add_detect(Program& program) {
                    "number from 0; 0,0 is the top left pixel of the photo as it was analysed (its "
                    "size is in summary.json; the overlays may be enlarged).")
       ->group("Change");
-  add_field(command, "overlays", arguments->options.overlays,
-            "Write overlays/: each photo beside its changes.");
-  add_field(command, "page", arguments->options.page, "Write report.html: everything in one page.");
+  add_field_of(command, arguments->options, "overlays", "Page");
+  add_field_of(command, arguments->options, "page", "Page");
   add_fields(command, arguments->options.report, "Page");
   command->footer(
       "Examples:\n"
