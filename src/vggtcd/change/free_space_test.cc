@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "tests/support/toy_scene.h"
 #include "vggtcd/change/pair_alignment.h"
 #include "vggtcd/change/view_overlap.h"
+#include "vggtcd/change/witness.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/scene/point_cloud.h"
 
@@ -21,8 +23,34 @@ using testing_support::kT2FromT1;
 using testing_support::reconstruct;
 using testing_support::ToyScene;
 
+constexpr std::vector<float> PhotoAnswers::*kValues[] = {
+    &PhotoAnswers::gap, &PhotoAnswers::evidence, &PhotoAnswers::confidence,
+    &PhotoAnswers::level_of_detection};
+
 ToyScene scene(double (*relief)(double, double), double offset) {
   return {.frames = 5, .width = 96, .height = 72, .camera_offset = offset, .relief = relief};
+}
+
+// All that the votes say, [S, H, W] of either epoch.
+struct Answers {
+  FreeSpaceChange change;
+  PhotoAnswers t1, t2;
+};
+Answers all_answers(const Reconstruction& before, const Reconstruction& after,
+                    double registration_sigma_u = 0) {
+  Answers all{{}, PhotoAnswers(before.num_pixels()), PhotoAnswers(after.num_pixels())};
+  const auto keep = [](PhotoAnswers& epoch) {
+    return [&epoch](int frame, const PhotoAnswers& photo) {
+      const auto copy = [&](const auto& from, auto& to) {
+        std::ranges::copy(from, to.begin() + frame * std::ssize(from));
+      };
+      copy(photo.label, epoch.label);
+      for (const auto values : kValues) copy(photo.*values, epoch.*values);
+    };
+  };
+  all.change = free_space_changes(before, after, kT2FromT1, {}, registration_sigma_u,
+                                  silent_progress(), nullptr, {keep(all.t1), keep(all.t2)});
+  return all;
 }
 
 // Where the pixel's point lies in the toy scene, for reconstructions in T2's frame.
@@ -69,7 +97,7 @@ TEST(FreeSpaceChanges, WhatTheBoxHidesIsNotCalledRemoved) {
 TEST(FreeSpaceChanges, ABoxThatVanishedIsRemoved) {
   const Reconstruction before = reconstruct(scene(box_relief, 0), Sim3{});
   const Reconstruction after = reconstruct(scene(flat_relief, 0.1), kT2FromT1);
-  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {});
+  const Answers change = all_answers(before, after);
   int removed_on_box = 0, removed_elsewhere = 0;
   for (size_t i = 0; i < before.num_pixels(); ++i) {
     if (change.t1.label[i] != ChangeLabel::kRemoved) continue;
@@ -108,13 +136,13 @@ TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
   const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
   const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
   set_num_threads(1);
-  const FreeSpaceChange one = free_space_changes(before, after, kT2FromT1, {});
+  const Answers one = all_answers(before, after);
   set_num_threads(5);
-  const FreeSpaceChange five = free_space_changes(before, after, kT2FromT1, {});
+  const Answers five = all_answers(before, after);
   set_num_threads(2);
   EXPECT_EQ(one.t2.label, five.t2.label);
-  for (const auto values : {&EpochFreeSpace::gap, &EpochFreeSpace::evidence,
-                            &EpochFreeSpace::confidence, &EpochFreeSpace::level_of_detection}) {
+  EXPECT_EQ(one.change.t2.changed_confidence, five.change.t2.changed_confidence);
+  for (const auto values : kValues) {
     for (size_t i = 0; i < one.t2.gap.size(); ++i) {
       const float a = (one.t2.*values)[i], b = (five.t2.*values)[i];
       EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b)));
@@ -122,10 +150,24 @@ TEST(FreeSpaceChanges, SameLabelsAndGapsForAnyNumberOfThreads) {
   }
 }
 
+TEST(FreeSpaceChanges, WhatIsKeptIsWhatThePhotosWereTold) {
+  const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
+  const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
+  const Answers all = all_answers(before, after);
+  EXPECT_EQ(all.change.t1.label, all.t1.label);
+  EXPECT_EQ(all.change.t2.label, all.t2.label);
+  std::vector<float> of_changed;
+  for (size_t i = 0; i < all.t2.label.size(); ++i) {
+    if (is_change(all.t2.label[i])) of_changed.push_back(all.t2.confidence[i]);
+  }
+  ASSERT_GT(of_changed.size(), 500u);
+  EXPECT_EQ(all.change.t2.changed_confidence, of_changed);
+}
+
 TEST(FreeSpaceChanges, TheLevelOfDetectionIsNeverBelowWhatTheRegistrationAllows) {
   const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
   const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
-  const FreeSpaceChange change = free_space_changes(before, after, kT2FromT1, {}, 0.01);
+  const Answers change = all_answers(before, after, 0.01);
   int judged = 0;
   for (size_t i = 0; i < after.num_pixels(); ++i) {
     if (change.t2.label[i] == ChangeLabel::kUnobserved ||
@@ -140,6 +182,52 @@ TEST(FreeSpaceChanges, TheLevelOfDetectionIsNeverBelowWhatTheRegistrationAllows)
   EXPECT_GT(judged, 1000);
 }
 
+// Windows of the pixel itself.
+class SinglePixels {
+ public:
+  explicit SinglePixels(const Reconstruction& r)
+      : reconstruction_(r), center_(r.pixels_per_frame(), 4 | 4 << 4), steps_(r.width) {}
+  DepthWindows of(int frame) const {
+    return {reconstruction_.frame_depth(frame).data(), center_.data(), &steps_, 1};
+  }
+
+ private:
+  const Reconstruction& reconstruction_;
+  std::vector<uint8_t> center_;
+  WindowSteps steps_;
+};
+
+TEST(Witness, KeepsTheNearestAndTheFarthestDepthAroundEachPixel) {
+  Reconstruction r = reconstruct(scene(box_relief, 0), Sim3{});
+  for (size_t i = 0; i < r.num_pixels(); i += 7) r.depth[i] = 0;
+  for (size_t i = 3; i < r.num_pixels(); i += 11) r.confidence[i] = -1;  // may not testify
+  for (int y = 20; y < 25; ++y) {
+    for (int x = 30; x < 36; ++x) r.depth[static_cast<size_t>(y * r.width + x)] = 0;
+  }
+  const Witness witness = make_witness(r, kT2FromT1, 0);
+  int without = 0;
+  for (int v = 0; v < r.height; ++v) {
+    for (int u = 0; u < r.width; ++u) {
+      std::vector<float> window;
+      for (int y = v - 1; y <= v + 1; ++y) {
+        for (int x = u - 1; x <= u + 1; ++x) {
+          const size_t i = static_cast<size_t>(y * r.width + x);
+          if (x < 0 || y < 0 || x >= r.width || y >= r.height || !testifies(r, i, 0)) continue;
+          window.push_back(static_cast<float>(kT2FromT1.scale) * r.depth[i]);
+        }
+      }
+      float near = 0, far = 0;
+      const bool found = witness.windows(0).read(static_cast<size_t>(v * r.width + u), near, far);
+      ASSERT_EQ(found, !window.empty()) << u << " " << v;
+      without += found ? 0 : 1;
+      if (!found) continue;
+      EXPECT_EQ(near, std::ranges::min(window));
+      EXPECT_EQ(far, std::ranges::max(window));
+    }
+  }
+  EXPECT_GT(without, 5);
+}
+
 // Two photos of one wavy surface whose poses disagree: the pair is brought together again.
 TEST(AlignPair, RemovesASmallRotationAndScale) {
   const auto waves = [](double x, double y) { return 0.2 * std::sin(2 * x) * std::cos(1.5 * y); };
@@ -151,8 +239,8 @@ TEST(AlignPair, RemovesASmallRotationAndScale) {
   for (uint32_t pixel = 0; pixel < truth.pixels_per_frame(); pixel += 3) {
     points.push_back((wrong * unproject_pixel(truth, pixel).cast<double>()).cast<float>());
   }
-  const std::span<const float> depth = truth.frame_depth(1);
-  const WitnessPhoto photo{truth.views[1].camera_from_world, truth.views[1].pinhole, depth, depth};
+  const SinglePixels windows(truth);
+  const WitnessPhoto photo{truth.views[1].camera_from_world, truth.views[1].pinhole, windows.of(1)};
   const PairAlignment before = align_pair(points, photo, 0.1, 5, {.iterations = 0});
   const PairAlignment after = align_pair(points, photo, 0.1, 5, {.iterations = 6});
   EXPECT_GT(before.gap_sigma, 0.008);
@@ -162,8 +250,8 @@ TEST(AlignPair, RemovesASmallRotationAndScale) {
 TEST(AlignPair, WithoutCommonSurfaceCorrectsNothing) {
   const Reconstruction r = reconstruct(scene(flat_relief, 0), Sim3{});
   const std::vector<Eigen::Vector3f> behind(100, Eigen::Vector3f(0, 0, -3));
-  const WitnessPhoto photo{r.views[0].camera_from_world, r.views[0].pinhole, r.frame_depth(0),
-                           r.frame_depth(0)};
+  const SinglePixels windows(r);
+  const WitnessPhoto photo{r.views[0].camera_from_world, r.views[0].pinhole, windows.of(0)};
   const PairAlignment pair = align_pair(behind, photo, 0.1, 5, {});
   EXPECT_EQ(pair.samples, 0);
   EXPECT_EQ(pair.matrix, r.views[0].camera_from_world.rotation);

@@ -90,6 +90,9 @@ class EpochRegions {
         }
       }
     }
+    check(change_.changed_confidence.empty() ||
+              change_.changed_confidence.size() == positions_.size(),
+          "find_instances: a confidence for every changed pixel");
   }
 
   void group() {
@@ -106,7 +109,7 @@ class EpochRegions {
     part.pixels = static_cast<int64_t>(members.size());
     part.box = principal_box(voxel_means(members));
     part.colors = colors(members, mean);
-    for (const uint32_t i : members) part.confidence += confidence_of(pixels_[i]);
+    for (const uint32_t i : members) part.confidence += confidence_of(i);
     part.confidence /= static_cast<double>(members.size());
 
     std::vector<InstancePhoto> photos = photos_of(members);
@@ -143,8 +146,9 @@ class EpochRegions {
     return chosen;
   }
 
-  double confidence_of(uint32_t pixel) const {
-    return change_.confidence.empty() ? 1.0 : static_cast<double>(change_.confidence[pixel]);
+  double confidence_of(uint32_t point) const {
+    const std::vector<float>& known = change_.changed_confidence;
+    return known.empty() ? 1.0 : static_cast<double>(known[point]);
   }
 
   // One point per voxel, so that near photos do not outvote far ones.
@@ -177,7 +181,7 @@ class EpochRegions {
       const int frame = pixel_at(epoch_, pixels_[i]).frame;
       if (photos.empty() || photos.back().frame != frame) photos.push_back({frame, 0, 0});
       ++photos.back().pixels;
-      photos.back().evidence += confidence_of(pixels_[i]);
+      photos.back().evidence += confidence_of(i);
     }
     std::ranges::stable_sort(photos, std::greater{}, &InstancePhoto::evidence);
     return photos;

@@ -154,7 +154,7 @@ TEST(FindInstances, ThingsBelowTheMinimumSizeAreLeftOut) {
 
 TEST(FindInstances, ThingsOfWhichTheVotesAreUnsureAreLeftOut) {
   Case c = make_case(flat_relief, right_box);
-  std::ranges::fill(c.changes.t2.confidence, 0.5f);
+  std::ranges::fill(c.changes.t2.changed_confidence, 0.5f);
   EXPECT_TRUE(instances_of(c).instances.empty());
   EXPECT_FALSE(instances_of(c, {.min_confidence = 0.4}).instances.empty());
 }

@@ -33,9 +33,10 @@ bool smooth_depth(const WitnessPhoto& photo, double u, double v, double& depth,
   const auto mean = [&](int column, int row, double& value) {
     const size_t i =
         static_cast<size_t>(row) * static_cast<size_t>(width) + static_cast<size_t>(column);
-    const double near = static_cast<double>(photo.near[i]), far = static_cast<double>(photo.far[i]);
-    value = 0.5 * (near + far);
-    return far > 0 && far < kSmooth * near;
+    float near = 0, far = 0;
+    if (!photo.windows.read(i, near, far)) return false;
+    value = 0.5 * (static_cast<double>(near) + static_cast<double>(far));
+    return static_cast<double>(far) < kSmooth * static_cast<double>(near);
   };
   double left = 0, right = 0, above = 0, below = 0;
   if (!mean(x, y, depth) || !mean(x - 1, y, left) || !mean(x + 1, y, right) ||

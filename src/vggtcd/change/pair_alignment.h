@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "vggtcd/change/depth_windows.h"
 #include "vggtcd/geometry/pinhole.h"
 #include "vggtcd/geometry/rigid3.h"
 
@@ -19,11 +20,11 @@ struct PairAlignmentOptions {
   int iterations = 4;
 };
 
-// A photo of the other epoch, depth in T2 units; 0 where there is none that may testify.
+// A photo of the other epoch, depth in T2 units.
 struct WitnessPhoto {
   Rigid3 camera_from_t2;
   Pinhole pinhole;
-  std::span<const float> near, far;  // [H, W] extremes of the window around each pixel
+  DepthWindows windows;
 };
 
 struct PairAlignment {

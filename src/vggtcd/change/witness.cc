@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a photo of the other epoch says about a point: the window maps.
+// What a photo of the other epoch says about a point: the windows of its depths.
 #include "vggtcd/change/witness.h"
 
 #include <algorithm>
@@ -10,33 +10,34 @@
 namespace vggtcd {
 
 Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence) {
-  Witness witness;
-  witness.epoch = &epoch;
+  Witness witness{&epoch,
+                  static_cast<float>(t2_from_epoch.scale),
+                  WindowSteps(epoch.width),
+                  {},
+                  std::vector<uint8_t>(epoch.num_pixels(), kNoExtremes)};
   for (const View& view : epoch.views) {
     witness.camera_from_t2.push_back(camera_from_new_world(view.camera_from_world, t2_from_epoch));
   }
-  witness.near.resize(epoch.num_pixels());
-  witness.far.resize(epoch.num_pixels());
   const int height = epoch.height, width = epoch.width;
   parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
     const size_t first = static_cast<size_t>(frame) * epoch.pixels_per_frame();
     for (int v = 0; v < height; ++v) {
       for (int u = 0; u < width; ++u) {
         float lo = std::numeric_limits<float>::max(), hi = 0;
+        int nearest = 0, farthest = 0;
         for (int y = std::max(0, v - 1); y <= std::min(height - 1, v + 1); ++y) {
           for (int x = std::max(0, u - 1); x <= std::min(width - 1, u + 1); ++x) {
             const size_t i = first + static_cast<size_t>(y) * static_cast<size_t>(width) +
                              static_cast<size_t>(x);
             if (!testifies(epoch, i, min_confidence)) continue;
-            lo = std::min(lo, epoch.depth[i]);
-            hi = std::max(hi, epoch.depth[i]);
+            const int in_window = 3 * (y - v + 1) + (x - u + 1);
+            if (epoch.depth[i] < lo) lo = epoch.depth[i], nearest = in_window;
+            if (epoch.depth[i] > hi) hi = epoch.depth[i], farthest = in_window;
           }
         }
         const size_t i =
             first + static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
-        const float scale = static_cast<float>(t2_from_epoch.scale);
-        witness.near[i] = lo * scale;
-        witness.far[i] = hi * scale;
+        if (hi > 0) witness.extremes[i] = static_cast<uint8_t>(nearest | farthest << 4);
       }
     }
   });

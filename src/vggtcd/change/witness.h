@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a photo of the other epoch says about a point: the window maps its depths are kept in, the
-// projection into it, and the one rule that makes a vote of both.
+// What a photo of the other epoch says about a point: its depths with the window around each pixel,
+// the projection into it, and the one rule that makes a vote of both.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "vggtcd/change/depth_windows.h"
 #include "vggtcd/change/pair_alignment.h"
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
@@ -17,10 +18,16 @@ namespace vggtcd {
 
 // An epoch with everything that a point of the other one is held against, in the common frame T2.
 struct Witness {
-  const Reconstruction* epoch = nullptr;
+  const Reconstruction* epoch;
+  float t2_scale;  // T2 units of a unit of the epoch
+  WindowSteps steps;
   std::vector<Rigid3> camera_from_t2;  // depths in T2 units
-  // [S, H, W] T2 units: extremes of the 3 x 3 window; far 0: no testimony
-  std::vector<float> near, far;
+  std::vector<uint8_t> extremes;       // [S, H, W]: of the DepthWindows
+
+  DepthWindows windows(size_t frame) const {
+    const size_t first = frame * epoch->pixels_per_frame();
+    return {epoch->depth.data() + first, extremes.data() + first, &steps, t2_scale};
+  }
 };
 
 // A pixel may testify, and be judged, if it has depth and is not among the least confident.
@@ -77,16 +84,14 @@ struct Testimony {
 };
 
 // The rule, with t = tolerance_sigmas * sigma * z: near - z > t looks through, z - far > t hidden,
-// otherwise the surface is seen. near and far are the photo's [H, W] of a Witness, x is in T2.
-inline Testimony ask(const PairProjection& pair, const float* near, const float* far,
+// otherwise the surface is seen. x is in T2.
+inline Testimony ask(const PairProjection& pair, const DepthWindows& photo,
                      const Eigen::Vector3f& x, float tolerance_sigmas) {
   Testimony said;
   if (!pair(x, said.pixel, said.z)) return said;
   said.vote = Vote::kNoTestimony;
-  said.near = near[said.pixel];
-  said.far = far[said.pixel];
   said.sigma_u = pair.sigma * said.z;
-  if (!(said.far > 0)) return said;
+  if (!photo.read(said.pixel, said.near, said.far)) return said;
   said.gap_u =
       said.z < said.near ? said.near - said.z : (said.z > said.far ? said.far - said.z : 0.0f);
   if (!(said.sigma_u > 0)) return said;

@@ -126,9 +126,15 @@ ChangeBenchmark benchmark_changes(const ChangeProblem& problem, const Sim3& t2_f
                  alignment, result);
   result.instances.push_back(
       {"distance", alignment, score_instances(problem, t2_from_t1, changes)});
-  FreeSpaceChange free_space = free_space_changes(before, after, t2_from_t1, {}, 0, progress);
-  const std::vector<float> rank_t1 = free_space.t1.evidence, rank_t2 = free_space.t2.evidence;
-  decide_by_labels(std::move(free_space), changes);
+  std::vector<float> rank_t1(before.num_pixels()), rank_t2(after.num_pixels());
+  const auto keep_evidence = [](std::vector<float>& rank) {
+    return [&rank](int frame, const PhotoAnswers& answers) {
+      std::ranges::copy(answers.evidence, rank.begin() + frame * std::ssize(answers.evidence));
+    };
+  };
+  decide_by_labels(free_space_changes(before, after, t2_from_t1, {}, 0, progress, nullptr,
+                                      {keep_evidence(rank_t1), keep_evidence(rank_t2)}),
+                   changes);
   score_all_ways(truth, answer_of(changes.t1, rank_t1), answer_of(changes.t2, rank_t2), "votes",
                  alignment, result);
   result.instances.push_back({"votes", alignment, score_instances(problem, t2_from_t1, changes)});

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -67,6 +68,11 @@ class NpzReader {
   std::vector<std::string> keys_;
 };
 
+// Sets values to elements first, first + 1, ... of an array in C order. Called from the first to
+// the last, perhaps more than once.
+template <typename T>
+using NpzFill = std::function<void(size_t first, std::span<T> values)>;
+
 enum class NpzCompression { kStored, kDeflate };
 
 // Collects arrays and writes them all in finish(). The bytes depend on the arrays alone: no clock,
@@ -84,8 +90,13 @@ class NpzWriter {
   // T: float, double, int32_t, int64_t, uint8_t. Call as add<float>("depth", {s, h, w}, depth).
   template <typename T>
   void add(std::string_view key, std::vector<int64_t> shape, std::span<const T> values);
+  // The same of values that are made when they are written; what fill throws, finish() throws.
+  // T as above.
+  template <typename T>
+  void add(std::string_view key, std::vector<int64_t> shape, NpzFill<T> fill);
   // Bytes 0 and 1, written as NumPy's bool.
   void add_mask(std::string_view key, std::vector<int64_t> shape, std::span<const uint8_t> mask);
+  void add_mask(std::string_view key, std::vector<int64_t> shape, NpzFill<uint8_t> fill);
   // A list of text, written as <U; copied.
   void add_strings(std::string_view key, std::span<const std::string> utf8);
 
@@ -93,8 +104,8 @@ class NpzWriter {
 
  private:
   struct Member;
-  void add_bytes(std::string_view key, std::string_view descr, std::span<const int64_t> shape,
-                 size_t item_size, std::span<const std::byte> bytes);
+  void add_member(std::string_view key, std::string_view descr, std::span<const int64_t> shape,
+                  size_t item_size, NpzFill<std::byte> fill);
 
   std::filesystem::path path_;
   NpzCompression compression_;

@@ -208,7 +208,7 @@ TEST(NpzWriter, ReaderGetsBackWhatWasAdded) {
     writer.add<int64_t>("l", {1}, l);
     writer.add<uint8_t>("u", {2, 2}, u);
     writer.add_mask("mask", {2}, mask);
-    writer.add<float>("empty", {0, 3}, {});
+    writer.add<float>("empty", {0, 3}, std::span<const float>());
     writer.add_strings("names", names);
     writer.finish();
     const NpzReader npz(directory / "a.npz");
@@ -238,6 +238,41 @@ TEST(NpzWriter, SameArraysGiveSameBytes) {
   EXPECT_EQ(bytes, file_bytes(directory / "b.npz"));
   // DOS time 00:00 and date 1980-01-01 in the local header: nothing of today.
   EXPECT_EQ(bytes.substr(10, 4), std::string("\x00\x00\x21\x00", 4));
+}
+
+TEST(NpzWriter, ValuesMadeWhileWritingGiveTheSameBytesAsValuesAtHand) {
+  const TemporaryDirectory directory;
+  constexpr size_t kCount = 200001;  // several pieces, the last one short
+  std::vector<float> values(kCount);
+  std::vector<uint8_t> mask(kCount);
+  for (size_t i = 0; i < kCount; ++i) {
+    values[i] = 0.5f * static_cast<float>(i);
+    mask[i] = i % 3 == 0 ? 1 : 0;
+  }
+  const std::vector<int64_t> shape = {static_cast<int64_t>(kCount)};
+  NpzWriter at_hand(directory / "a.npz"), made(directory / "b.npz");
+  at_hand.add<float>("x", shape, values);
+  at_hand.add_mask("mask", shape, mask);
+  at_hand.finish();
+  made.add<float>("x", shape, [&](size_t first, std::span<float> out) {
+    for (float& value : out) value = 0.5f * static_cast<float>(first++);
+  });
+  made.add_mask("mask", shape, [&](size_t first, std::span<uint8_t> out) {
+    for (uint8_t& value : out) value = first++ % 3 == 0 ? 1 : 0;
+  });
+  made.finish();
+  EXPECT_EQ(file_bytes(directory / "a.npz"), file_bytes(directory / "b.npz"));
+  EXPECT_EQ(NpzReader(directory / "b.npz").read<float>("x"), values);
+}
+
+TEST(NpzWriter, WhatTheMakerOfValuesThrowsComesOutAndNothingIsWritten) {
+  const TemporaryDirectory directory;
+  NpzWriter writer(directory / "a.npz");
+  writer.add<float>("x", {100000}, [](size_t first, std::span<float>) {
+    if (first > 0) throw_error(ErrorCode::kDegenerate, "no more values");
+  });
+  EXPECT_ERROR(writer.finish(), ErrorCode::kDegenerate, "no more values");
+  EXPECT_EQ(directory.num_files(), 0u);
 }
 
 TEST(NpzWriter, NumpyReadsWhatItWrites) {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// NpzWriter: libzip fed straight from the caller's arrays.
+// NpzWriter: libzip fed piece by piece with what the caller has or makes.
 #include <zip.h>
 
 #include <algorithm>
-#include <cstring>
+#include <exception>
+#include <memory>
 #include <string>
 
 #include "vggtcd/core/error.h"
@@ -16,6 +17,7 @@ namespace {
 // 1 January 1980, the first day a zip archive knows, as DOS date and time.
 constexpr zip_uint16_t kDosDate = 1 << 5 | 1;
 constexpr zip_uint16_t kDosTime = 0;
+constexpr size_t kPieceBytes = 1 << 18;  // in which values are made
 
 template <typename T>
 std::string_view npy_descr();
@@ -64,13 +66,120 @@ std::u32string code_points(std::string_view utf8) {
   return result;
 }
 
+void check_size(size_t values, std::span<const int64_t> shape) {
+  size_t expected = 1;
+  for (const int64_t size : shape) expected *= static_cast<size_t>(size);
+  check(values == expected, "NpzWriter: as many values as the shape says");
+}
+
+NpzFill<std::byte> copy_of(std::span<const std::byte> bytes) {
+  return [bytes](size_t first, std::span<std::byte> values) {
+    std::ranges::copy(bytes.subspan(first, values.size()), values.begin());
+  };
+}
+
+template <typename T>
+NpzFill<std::byte> fill_of(NpzFill<T> fill) {
+  return [fill = std::move(fill)](size_t first, std::span<std::byte> bytes) {
+    // Pieces begin at multiples of kPieceBytes in memory that suits every number.
+    fill(first / sizeof(T), {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)});
+  };
+}
+
+// A member as libzip asks for it: the header, then the values piece by piece.
+class MemberSource {
+ public:
+  MemberSource(std::string_view header, uint64_t data_bytes, const NpzFill<std::byte>& fill)
+      : header_(header), data_bytes_(data_bytes), fill_(fill) {
+    zip_error_init(&error_);
+  }
+  ~MemberSource() { zip_error_fini(&error_); }
+  MemberSource(const MemberSource&) = delete;
+  MemberSource& operator=(const MemberSource&) = delete;
+
+  // What fill threw, if it did; it must not pass through libzip.
+  std::exception_ptr failure() const { return failure_; }
+
+  static zip_int64_t callback(void* self, void* data, zip_uint64_t length,
+                              zip_source_cmd_t command) {
+    return static_cast<MemberSource*>(self)->answer(data, length, command);
+  }
+
+ private:
+  zip_int64_t answer(void* data, zip_uint64_t length, zip_source_cmd_t command) {
+    switch (command) {
+      case ZIP_SOURCE_OPEN:
+        rest_ = std::as_bytes(std::span(header_));
+        filled_ = 0;
+        return 0;
+      case ZIP_SOURCE_READ:
+        return read({static_cast<std::byte*>(data), length});
+      case ZIP_SOURCE_STAT: {
+        zip_stat_t* stat = static_cast<zip_stat_t*>(data);
+        zip_stat_init(stat);
+        stat->size = header_.size() + data_bytes_;
+        stat->valid = ZIP_STAT_SIZE;
+        return sizeof(zip_stat_t);
+      }
+      case ZIP_SOURCE_CLOSE:
+      case ZIP_SOURCE_FREE:
+        return 0;
+      case ZIP_SOURCE_ERROR:
+        return zip_error_to_data(&error_, data, length);
+      case ZIP_SOURCE_SUPPORTS:
+        return zip_source_make_command_bitmap(ZIP_SOURCE_OPEN, ZIP_SOURCE_READ, ZIP_SOURCE_CLOSE,
+                                              ZIP_SOURCE_STAT, ZIP_SOURCE_ERROR, ZIP_SOURCE_FREE,
+                                              -1);
+      default:
+        zip_error_set(&error_, ZIP_ER_OPNOTSUPP, 0);
+        return -1;
+    }
+  }
+
+  zip_int64_t read(std::span<std::byte> target) {
+    size_t count = 0;
+    while (count < target.size()) {
+      if (rest_.empty() && !next_piece()) break;
+      const size_t part = std::min(rest_.size(), target.size() - count);
+      std::ranges::copy(rest_.first(part), target.begin() + static_cast<std::ptrdiff_t>(count));
+      rest_ = rest_.subspan(part);
+      count += part;
+    }
+    return failure_ ? -1 : static_cast<zip_int64_t>(count);
+  }
+
+  bool next_piece() {
+    if (failure_ || filled_ == data_bytes_) return false;
+    piece_.resize(std::min<uint64_t>(kPieceBytes, data_bytes_ - filled_));
+    try {
+      fill_(filled_, piece_);
+    } catch (...) {
+      failure_ = std::current_exception();
+      zip_error_set(&error_, ZIP_ER_READ, 0);
+      return false;
+    }
+    filled_ += piece_.size();
+    rest_ = piece_;
+    return true;
+  }
+
+  std::string_view header_;
+  uint64_t data_bytes_;
+  const NpzFill<std::byte>& fill_;
+  uint64_t filled_ = 0;
+  std::vector<std::byte> piece_;
+  std::span<const std::byte> rest_;  // of the header or the piece, not yet asked for
+  std::exception_ptr failure_;
+  zip_error_t error_;
+};
+
 }  // namespace
 
 struct NpzWriter::Member {
   std::string key;
   std::string header;
-  std::span<const std::byte> bytes;
-  std::vector<char32_t> owned{};  // what `bytes` points to, for text
+  uint64_t data_bytes = 0;
+  NpzFill<std::byte> fill;
 };
 
 NpzWriter::NpzWriter(std::filesystem::path path, NpzCompression compression)
@@ -78,29 +187,45 @@ NpzWriter::NpzWriter(std::filesystem::path path, NpzCompression compression)
 
 NpzWriter::~NpzWriter() = default;
 
-void NpzWriter::add_bytes(std::string_view key, std::string_view descr,
-                          std::span<const int64_t> shape, size_t item_size,
-                          std::span<const std::byte> bytes) {
-  size_t expected = item_size;
-  for (const int64_t size : shape) expected *= static_cast<size_t>(size);
-  check(bytes.size() == expected, "NpzWriter: as many values as the shape says");
+void NpzWriter::add_member(std::string_view key, std::string_view descr,
+                           std::span<const int64_t> shape, size_t item_size,
+                           NpzFill<std::byte> fill) {
+  uint64_t bytes = item_size;
+  for (const int64_t size : shape) bytes *= static_cast<uint64_t>(size);
   for (const Member& member : members_) check(member.key != key, "NpzWriter: a key added once");
-  members_.push_back({std::string(key), npy_header(descr, shape), bytes});
+  members_.push_back({std::string(key), npy_header(descr, shape), bytes, std::move(fill)});
 }
 
 template <typename T>
 void NpzWriter::add(std::string_view key, std::vector<int64_t> shape, std::span<const T> values) {
-  add_bytes(key, npy_descr<T>(), shape, sizeof(T), std::as_bytes(values));
+  check_size(values.size(), shape);
+  add_member(key, npy_descr<T>(), shape, sizeof(T), copy_of(std::as_bytes(values)));
 }
+
+template <typename T>
+void NpzWriter::add(std::string_view key, std::vector<int64_t> shape, NpzFill<T> fill) {
+  add_member(key, npy_descr<T>(), shape, sizeof(T), fill_of(std::move(fill)));
+}
+
 template void NpzWriter::add(std::string_view, std::vector<int64_t>, std::span<const float>);
+template void NpzWriter::add(std::string_view, std::vector<int64_t>, NpzFill<float>);
 template void NpzWriter::add(std::string_view, std::vector<int64_t>, std::span<const double>);
+template void NpzWriter::add(std::string_view, std::vector<int64_t>, NpzFill<double>);
 template void NpzWriter::add(std::string_view, std::vector<int64_t>, std::span<const int32_t>);
+template void NpzWriter::add(std::string_view, std::vector<int64_t>, NpzFill<int32_t>);
 template void NpzWriter::add(std::string_view, std::vector<int64_t>, std::span<const int64_t>);
+template void NpzWriter::add(std::string_view, std::vector<int64_t>, NpzFill<int64_t>);
 template void NpzWriter::add(std::string_view, std::vector<int64_t>, std::span<const uint8_t>);
+template void NpzWriter::add(std::string_view, std::vector<int64_t>, NpzFill<uint8_t>);
 
 void NpzWriter::add_mask(std::string_view key, std::vector<int64_t> shape,
                          std::span<const uint8_t> mask) {
-  add_bytes(key, "|b1", shape, 1, std::as_bytes(mask));
+  check_size(mask.size(), shape);
+  add_member(key, "|b1", shape, 1, copy_of(std::as_bytes(mask)));
+}
+
+void NpzWriter::add_mask(std::string_view key, std::vector<int64_t> shape, NpzFill<uint8_t> fill) {
+  add_member(key, "|b1", shape, 1, fill_of(std::move(fill)));
 }
 
 void NpzWriter::add_strings(std::string_view key, std::span<const std::string> utf8) {
@@ -116,9 +241,10 @@ void NpzWriter::add_strings(std::string_view key, std::span<const std::string> u
               padded.begin() + static_cast<std::ptrdiff_t>(i * longest));
   }
   const int64_t count = static_cast<int64_t>(utf8.size());
-  add_bytes(key, fmt::format("<U{}", longest), {&count, 1}, 4 * longest,
-            std::as_bytes(std::span(padded)));
-  members_.back().owned = std::move(padded);  // moving a vector keeps its elements in place
+  add_member(key, fmt::format("<U{}", longest), {&count, 1}, 4 * longest,
+             [padded = std::move(padded)](size_t first, std::span<std::byte> values) {
+               copy_of(std::as_bytes(std::span(padded)))(first, values);
+             });
 }
 
 void NpzWriter::finish() {
@@ -136,16 +262,11 @@ void NpzWriter::finish() {
     zip_error_fini(&error);
     fail(text);
   }
+  std::vector<std::unique_ptr<MemberSource>> sources;
   for (const Member& member : members_) {
-    const auto length = [](auto& bytes) { return static_cast<zip_uint64_t>(bytes.size()); };
-    // libzip takes pointers to non-const but, with freep 0, only reads.
-    const auto data = [](auto& bytes) {
-      return reinterpret_cast<zip_uint8_t*>(
-          const_cast<void*>(static_cast<const void*>(bytes.data())));
-    };
-    const zip_buffer_fragment_t parts[] = {{data(member.header), length(member.header)},
-                                           {data(member.bytes), length(member.bytes)}};
-    zip_source_t* source = zip_source_buffer_fragment(zip, parts, member.bytes.empty() ? 1 : 2, 0);
+    sources.push_back(
+        std::make_unique<MemberSource>(member.header, member.data_bytes, member.fill));
+    zip_source_t* source = zip_source_function(zip, MemberSource::callback, sources.back().get());
     const std::string name = member.key + ".npy";
     const zip_int64_t index =
         source == nullptr ? -1 : zip_file_add(zip, name.c_str(), source, ZIP_FL_ENC_UTF_8);
@@ -166,6 +287,9 @@ void NpzWriter::finish() {
     const std::string text = zip_strerror(zip);
     zip_discard(zip);
     throw_if_interrupted();
+    for (const auto& source : sources) {
+      if (source->failure()) std::rethrow_exception(source->failure());
+    }
     fail(text);
   }
 }

@@ -143,16 +143,19 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   epochs.joint.reset();
 
   // 3. Compare.
+  const std::filesystem::path& aside = directory.path();
+  std::optional<AnswerStore> answers;  // where photos vote
   ChangeSet changes;
   log.run("change detection", [&](ProgressStage&) {
     changes = detect_changes(epochs.before, epochs.after, t2_from_t1, options.change);
   });
   if (by_free_space(inputs, options)) {
+    answers.emplace(aside);
     log.run("free-space votes", [&](ProgressStage&) {
       FreeSpaceChange votes =
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
                              registration_sigma_u(outcome.alignment), silent_progress(),
-                             question ? &*question : nullptr);
+                             question ? &*question : nullptr, answers->sink());
       outcome.explanation = std::move(votes.explanation);
       decide_by_labels(std::move(votes), changes);
     });
@@ -174,19 +177,21 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   outcome.unobserved_t2 = changes.t2.unobserved;
 
   // 4. Write.
-  const std::filesystem::path& aside = directory.path();
   log.run("write results", [&](ProgressStage& stage) {
     write_json_file(aside / "sim3.json", sim3_json(outcome.alignment));
     write_cameras(aside, epochs.before, epochs.after, t2_from_t1);
-    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances);
+    const AnswerStore* voted = answers ? &*answers : nullptr;
+    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances, voted);
     write_change_list(aside, instances, epochs.before, epochs.after, changes);
     if (outcome.explanation) {
       write_json_file(aside / "explain.json", explanation_json(*outcome.explanation));
     }
     stage.advance(0.2);
-    write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes);
+    write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes,
+                     voted ? &voted->t1 : nullptr);
     stage.advance(0.4);
-    write_change_ply(aside / "after.ply", epochs.after, {}, changes.t2, changes);
+    write_change_ply(aside / "after.ply", epochs.after, {}, changes.t2, changes,
+                     voted ? &voted->t2 : nullptr);
     stage.advance(0.6);
     if (options.overlays) {
       write_overlays(aside / "overlays" / "before", epochs.before, changes.t1, changes);
@@ -205,6 +210,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
     epochs = {};
     changes = {};
     instances = {};
+    answers.reset();
     log.run("report page", [&](ProgressStage& stage) {
       const ReportInput input = read_results(aside);
       stage.advance(0.5);

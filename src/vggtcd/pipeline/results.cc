@@ -87,19 +87,6 @@ Json epoch_change_json(const EpochChange& change) {
                                               : 0.0}};
 }
 
-std::vector<uint8_t> changed_mask(const EpochChange& change, const ChangeSet& changes) {
-  std::vector<uint8_t> mask(change.score.size());
-  for (size_t i = 0; i < mask.size(); ++i) mask[i] = changes.changed(change, i) ? 1 : 0;
-  return mask;
-}
-
-std::vector<uint8_t> label_codes(const EpochChange& change) {
-  std::vector<uint8_t> codes;
-  codes.reserve(change.label.size());
-  for (const ChangeLabel label : change.label) codes.push_back(static_cast<uint8_t>(label));
-  return codes;
-}
-
 Trajectory trajectory_of(const std::vector<View>& views) {
   Trajectory trajectory;
   for (const View& view : views) trajectory.push_back({view.name, view.camera_from_world});
@@ -195,34 +182,35 @@ Json stages_json(const StageLog& log) {
 
 void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
                       const Sim3& t2_from_epoch, const EpochChange& change,
-                      const ChangeSet& changes) {
+                      const ChangeSet& changes, const StoredAnswers* answers) {
   const std::string comments[] = {"frame: T2, model units"};
   std::vector<std::string> fields = {"change_distance", "changed", "confidence"};
-  if (!change.label.empty()) {
-    fields.insert(fields.end(), {"label", "label_confidence", "level_of_detection"});
-  }
-  const size_t num_fields = fields.size();
+  if (answers) fields.insert(fields.end(), {"label", "label_confidence", "level_of_detection"});
+  const size_t num_fields = fields.size(), per_frame = epoch.pixels_per_frame();
   PlyWriter writer(path, static_cast<size_t>(change.points), std::move(fields), comments);
+  std::vector<float> label_confidence(answers ? per_frame : 0);
+  std::vector<float> level_of_detection(answers ? per_frame : 0);
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
     const PixelRays rays(epoch.views[static_cast<size_t>(frame)], t2_from_epoch);
-    size_t pixel = static_cast<size_t>(frame) * epoch.pixels_per_frame();
-    for (int v = 0; v < epoch.height; ++v) {
-      for (int u = 0; u < epoch.width; ++u, ++pixel) {
-        const float score = change.score[pixel];
-        if (change.label.empty() ? std::isnan(score)
-                                 : change.label[pixel] == ChangeLabel::kNoEvidence) {
-          continue;
-        }
-        std::array<float, 6> values = {score, changes.changed(change, pixel) ? 1.0f : 0.0f,
-                                       epoch.confidence[pixel]};
-        if (!change.label.empty()) {
-          values[3] = static_cast<float>(change.label[pixel]);
-          values[4] = change.confidence[pixel];
-          values[5] = change.level_of_detection[pixel];
-        }
-        writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel],
-                   std::span(values).first(num_fields));
+    const size_t first = static_cast<size_t>(frame) * per_frame;
+    if (answers) {
+      answers->confidence.read(first, label_confidence);
+      answers->level_of_detection.read(first, level_of_detection);
+    }
+    for (size_t i = 0; i < per_frame; ++i) {
+      const size_t pixel = first + i;
+      const float score = change.score[pixel];
+      if (answers ? change.label[pixel] == ChangeLabel::kNoEvidence : std::isnan(score)) continue;
+      std::array<float, 6> values = {score, changes.changed(change, pixel) ? 1.0f : 0.0f,
+                                     epoch.confidence[pixel]};
+      if (answers) {
+        values[3] = static_cast<float>(change.label[pixel]);
+        values[4] = label_confidence[i];
+        values[5] = level_of_detection[i];
       }
+      const int u = static_cast<int>(i) % epoch.width, v = static_cast<int>(i) / epoch.width;
+      writer.add(rays.point(u, v, epoch.depth[pixel]), &epoch.color[3 * pixel],
+                 std::span(values).first(num_fields));
     }
   }
   writer.commit();
@@ -230,38 +218,54 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
 
 void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
                       const Reconstruction& after, const ChangeSet& changes,
-                      const ChangeInstances& instances) {
+                      const ChangeInstances& instances, const AnswerStore* answers) {
+  struct Part {
+    const char* suffix;
+    std::vector<int64_t> shape;
+    const EpochChange& change;
+    const std::vector<int32_t>& instance;
+    const StoredAnswers* answers;
+  };
   const auto shape = [](const Reconstruction& r) {
     return std::vector<int64_t>{r.num_frames(), r.height, r.width};
   };
-  const std::vector<uint8_t> mask_t1 = changed_mask(changes.t1, changes);
-  const std::vector<uint8_t> mask_t2 = changed_mask(changes.t2, changes);
+  const Part parts[] = {
+      {"t1", shape(before), changes.t1, instances.id_t1, answers ? &answers->t1 : nullptr},
+      {"t2", shape(after), changes.t2, instances.id_t2, answers ? &answers->t2 : nullptr}};
   NpzWriter writer(path);
-  writer.add<float>("score_t1", shape(before), changes.t1.score);
-  writer.add<float>("score_t2", shape(after), changes.t2.score);
-  writer.add_mask("changed_t1", shape(before), mask_t1);
-  writer.add_mask("changed_t2", shape(after), mask_t2);
-  std::vector<uint8_t> label_t1, label_t2;
-  if (!changes.t1.label.empty()) {
-    label_t1 = label_codes(changes.t1);
-    label_t2 = label_codes(changes.t2);
-    writer.add<uint8_t>("label_t1", shape(before), label_t1);
-    writer.add<uint8_t>("label_t2", shape(after), label_t2);
-  }
-  const auto add_votes = [&](const char* suffix, const Reconstruction& r,
-                             const EpochChange& change) {
-    if (change.label.empty()) return;
-    for (const auto& [name, values] : {std::pair{"gap", &change.gap},
-                                       {"evidence", &change.evidence},
-                                       {"confidence", &change.confidence},
-                                       {"level_of_detection", &change.level_of_detection}}) {
-      writer.add<float>(fmt::format("{}_{}", name, suffix), shape(r), *values);
-    }
+  const auto for_parts = [&](const char* name, const auto& add) {
+    for (const Part& part : parts) add(fmt::format("{}_{}", name, part.suffix), part);
   };
-  add_votes("t1", before, changes.t1);
-  add_votes("t2", after, changes.t2);
-  writer.add<int32_t>("instance_t1", shape(before), instances.id_t1);
-  writer.add<int32_t>("instance_t2", shape(after), instances.id_t2);
+  for_parts("score", [&](const std::string& key, const Part& part) {
+    writer.add<float>(key, part.shape, part.change.score);
+  });
+  for_parts("changed", [&](const std::string& key, const Part& part) {
+    writer.add_mask(key, part.shape, [&](size_t first, std::span<uint8_t> mask) {
+      for (uint8_t& value : mask) value = changes.changed(part.change, first++) ? 1 : 0;
+    });
+  });
+  if (answers) {
+    for_parts("label", [&](const std::string& key, const Part& part) {
+      writer.add<uint8_t>(key, part.shape, [&](size_t first, std::span<uint8_t> labels) {
+        for (uint8_t& value : labels) value = static_cast<uint8_t>(part.change.label[first++]);
+      });
+    });
+    for (const Part& part : parts) {
+      for (const auto& [name, values] :
+           {std::pair{"gap", &part.answers->gap},
+            {"evidence", &part.answers->evidence},
+            {"confidence", &part.answers->confidence},
+            {"level_of_detection", &part.answers->level_of_detection}}) {
+        writer.add<float>(fmt::format("{}_{}", name, part.suffix), part.shape,
+                          [array = values](size_t first, std::span<float> target) {
+                            array->read(first, target);
+                          });
+      }
+    }
+  }
+  for_parts("instance", [&](const std::string& key, const Part& part) {
+    writer.add<int32_t>(key, part.shape, part.instance);
+  });
   writer.finish();
 }
 

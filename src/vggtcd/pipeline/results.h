@@ -11,6 +11,7 @@
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/pipeline/alignment.h"
+#include "vggtcd/pipeline/answer_store.h"
 #include "vggtcd/scene/reconstruction.h"
 
 namespace vggtcd {
@@ -33,16 +34,16 @@ Json stages_json(const StageLog& log);
 // All functions below write into an existing directory and throw Error{kOutput}.
 
 // A point of every pixel with evidence, in the frame of T2: colour, change_distance, changed,
-// confidence.
+// confidence, and where labels decide what the votes said (`answers`, else null).
 void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
                       const Sim3& t2_from_epoch, const EpochChange& change,
-                      const ChangeSet& changes);
+                      const ChangeSet& changes, const StoredAnswers* answers);
 
-// change.npz: score, changed, instance, and with labels label and confidence; all [S, H, W] of
-// either epoch.
+// change.npz: score, changed, instance, and where labels decide the label and the answers (else
+// null); all [S, H, W] of either epoch.
 void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
                       const Reconstruction& after, const ChangeSet& changes,
-                      const ChangeInstances& instances);
+                      const ChangeInstances& instances, const AnswerStore* answers);
 
 // One PNG per photo into `directory`, named like the photo: beside it its distances or, where
 // labels decide, its answers.

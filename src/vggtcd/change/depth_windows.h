@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// DepthWindows: the nearest and the farthest depth in the 3 x 3 pixels around each pixel of a
+// photo, kept as two places of four bits, because two more depths per pixel would be the largest
+// arrays of the whole change stage.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace vggtcd {
+
+inline constexpr uint8_t kNoExtremes = 0xff;  // nothing in the window may testify
+
+// From a pixel to each place of its window, 0 to 8, row by row.
+struct WindowSteps {
+  std::array<int, 16> to{};  // as many as four bits could name
+
+  explicit WindowSteps(int width) {
+    for (int place = 0; place < 9; ++place) {
+      to[static_cast<size_t>(place)] = (place / 3 - 1) * width + place % 3 - 1;
+    }
+  }
+};
+
+// Of one photo; refers to arrays that live elsewhere.
+struct DepthWindows {
+  const float* depth = nullptr;       // [H, W]
+  const uint8_t* extremes = nullptr;  // [H, W]: the place of the nearest depth in the low four
+                                      // bits, that of the farthest in the high ones; kNoExtremes
+  const WindowSteps* steps = nullptr;
+  float scale = 1;  // multiplies depths
+
+  // False where nothing in the window may testify.
+  bool read(size_t pixel, float& near, float& far) const {
+    const uint8_t places = extremes[pixel];
+    if (places == kNoExtremes) return false;
+    const float* center = depth + pixel;
+    near = scale * center[steps->to[places & 15]];
+    far = scale * center[steps->to[places >> 4]];
+    return true;
+  }
+};
+
+}  // namespace vggtcd
