@@ -37,19 +37,18 @@ void add_detect(Program& program) {
       arguments->photos.after = epochs.after;
       epochs.require_none();
       if (arguments->dry_run) {
-        fmt::print("{}", describe_plan(arguments->photos, progress));
+        fmt::print("{}", describe_plan(arguments->photos, arguments->options, progress));
         return;
       }
-      photos = reconstruct_photos(arguments->photos, epochs.out, progress);
+      photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);
       fmt::print("{}\n", photos.explanation);
       inputs = photos.inputs;
     } else {
-      if (arguments->dry_run) {
-        throw_error(ErrorCode::kUsage,
-                    "--dry-run: plans the reconstruction of photos; {} and {} are predictions",
-                    epochs.before, epochs.after);
-      }
       inputs = epochs.inputs();
+      if (arguments->dry_run) {
+        fmt::print("{}", describe_plan(inputs, arguments->options));
+        return;
+      }
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
     fmt::print("{}\n", outcome.alignment.explanation);
@@ -89,8 +88,9 @@ void add_detect(Program& program) {
   add_fields(command, arguments->photos.reconstruction, "Photos");
   command
       ->add_flag("--dry-run", arguments->dry_run,
-                 "Print the plan (frames, sizes, memory, time) and do nothing. Photos only.")
-      ->group("Photos");
+                 "Print the plan (frames, sizes, memory, time) and do nothing. Photos are read, so "
+                 "that what is wrong with them is said now.")
+      ->group("General");
   add_fields(command, arguments->options.alignment, "Alignment");
   add_field_of(command, arguments->options, "change_method", "Change");
   add_fields(command, arguments->options.change, "Change");

@@ -3,12 +3,15 @@
 #include "vggtcd/cli/terminal_progress.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
+#include "vggtcd/core/job_clock.h"
 #include "vggtcd/core/timer.h"
 
 namespace vggtcd::cli {
@@ -23,6 +26,10 @@ std::string duration_text(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole % 3600 / 60);
 }
 
+std::string whole_seconds(double seconds) {
+  return seconds < 10 ? fmt::format("{:.0f} s", seconds) : duration_text(seconds);
+}
+
 class NoticesOnly : public ProgressSink {
  public:
   void stage_started(std::string_view) override {}
@@ -31,61 +38,106 @@ class NoticesOnly : public ProgressSink {
   void notice(std::string_view message) override { fmt::print(stderr, "note: {}\n", message); }
 };
 
-class PlainLines : public NoticesOnly {
+// What the displays share: the clock of stage and job.
+class TimedProgress : public ProgressSink {
  public:
-  void stage_finished(std::string_view stage, double seconds) override {
-    fmt::print(stderr, "{}: {}\n", stage, duration_text(seconds));
-  }
-  void stage_started(std::string_view) override {
-    started_s_ = monotonic_seconds();
-    shown_s_ = started_s_;
+  void job_planned(const std::vector<PlannedStage>& stages) override { clock_.planned(stages); }
+  void stage_started(std::string_view stage) override {
+    clock_.started(stage, monotonic_seconds());
+    show_started(stage);
   }
   void stage_advanced(std::string_view stage, double fraction) override {
+    clock_.advanced(fraction);
+    show_advanced(stage, fraction);
+  }
+  void stage_finished(std::string_view stage, double seconds) override {
+    clock_.finished(monotonic_seconds());
+    show_finished(stage, seconds);
+  }
+
+ protected:
+  virtual void show_started(std::string_view stage) = 0;
+  virtual void show_advanced(std::string_view stage, double fraction) = 0;
+  virtual void show_finished(std::string_view stage, double seconds) = 0;
+
+  std::optional<double> job_seconds_left() const {
+    return clock_.job_seconds_left(monotonic_seconds());
+  }
+  // ", 12 s left", or nothing if that is not known yet.
+  std::string stage_left_text() const {
+    const std::optional<double> left = clock_.stage_seconds_left(monotonic_seconds());
+    return left ? fmt::format(", {} left", duration_text(*left)) : std::string();
+  }
+  // "; about 1 min 20 s to go", of the whole job.
+  std::string job_left_text() const {
+    const std::optional<double> left = job_seconds_left();
+    return left && *left >= 0.5 ? fmt::format("; about {} to go", whole_seconds(*left))
+                                : std::string();
+  }
+
+ private:
+  JobClock clock_;
+};
+
+class PlainLines : public TimedProgress {
+ public:
+  void notice(std::string_view message) override { fmt::print(stderr, "note: {}\n", message); }
+
+ protected:
+  void show_started(std::string_view) override { shown_s_ = monotonic_seconds(); }
+  void show_advanced(std::string_view stage, double fraction) override {
     constexpr double kEverySeconds = 30;
     const double now = monotonic_seconds();
     if (now - shown_s_ < kEverySeconds || fraction <= 0 || fraction >= 1) return;
     shown_s_ = now;
-    const double left = (now - started_s_) * (1 - fraction) / fraction;
-    fmt::print(stderr, "{}: {:.0f} %, {} left\n", stage, 100 * fraction, duration_text(left));
+    fmt::print(stderr, "{}: {:.0f} %{}{}\n", stage, 100 * fraction, stage_left_text(),
+               job_left_text());
+  }
+  void show_finished(std::string_view stage, double seconds) override {
+    constexpr double kWorthSayingS = 3;
+    const bool is_long = job_seconds_left().value_or(0) >= kWorthSayingS;
+    fmt::print(stderr, "{}: {}{}\n", stage, duration_text(seconds), is_long ? job_left_text() : "");
   }
 
  private:
-  double started_s_ = 0;
   double shown_s_ = 0;
 };
 
-class LiveLine : public ProgressSink {
+class LiveLine : public TimedProgress {
  public:
   ~LiveLine() override { erase(); }
-  void stage_started(std::string_view stage) override {
-    started_s_ = monotonic_seconds();
-    draw(fmt::format("{} ...", stage));
-  }
-  void stage_advanced(std::string_view stage, double fraction) override {
-    const double now = monotonic_seconds();
-    if (now - drawn_s_ < 0.1) return;
-    constexpr int kWidth = 24;
-    const int full = static_cast<int>(fraction * kWidth);
-    std::string left;
-    if (fraction > 0.02 && now - started_s_ > 1) {
-      left =
-          fmt::format(", {} left", duration_text((now - started_s_) * (1 - fraction) / fraction));
-    }
-    draw(fmt::format("{} [{}{}] {:.0f} %{}", stage, std::string(static_cast<size_t>(full), '='),
-                     std::string(static_cast<size_t>(kWidth - full), ' '), 100 * fraction, left));
-  }
-  void stage_finished(std::string_view stage, double seconds) override {
-    erase();
-    fmt::print(stderr, "{}: {}\n", stage, duration_text(seconds));
-  }
   void notice(std::string_view message) override {
     erase();
     fmt::print(stderr, "note: {}\n", message);
   }
 
+ protected:
+  void show_started(std::string_view stage) override {
+    draw(fmt::format("{} ...{}", stage, job_left_text()));
+  }
+  void show_advanced(std::string_view stage, double fraction) override {
+    constexpr double kEverySeconds = 0.1;
+    constexpr int kWidth = 16;
+    if (monotonic_seconds() - drawn_s_ < kEverySeconds) return;
+    const int full = static_cast<int>(fraction * kWidth);
+    draw(fmt::format("{} [{}{}] {:.0f} %{}{}", stage, std::string(static_cast<size_t>(full), '='),
+                     std::string(static_cast<size_t>(kWidth - full), ' '), 100 * fraction,
+                     stage_left_text(), job_left_text()));
+  }
+  void show_finished(std::string_view stage, double seconds) override {
+    erase();
+    fmt::print(stderr, "{}: {}\n", stage, duration_text(seconds));
+  }
+
  private:
+  // A line that is longer than the terminal would wrap and could not be erased.
+  static size_t terminal_columns() {
+    winsize size{};
+    if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+    return size.ws_col;
+  }
   void draw(const std::string& line) {
-    fmt::print(stderr, "\r\x1b[K{}", line);
+    fmt::print(stderr, "\r\x1b[K{}", line.substr(0, terminal_columns() - 1));
     std::fflush(stderr);
     drawn_s_ = monotonic_seconds();
     drawn_ = true;
@@ -94,28 +146,40 @@ class LiveLine : public ProgressSink {
     if (drawn_) fmt::print(stderr, "\r\x1b[K");
     drawn_ = false;
   }
-  double started_s_ = 0;
   double drawn_s_ = 0;
   bool drawn_ = false;
 };
 
-class JsonLines : public ProgressSink {
+class JsonLines : public TimedProgress {
  public:
-  void stage_started(std::string_view stage) override {
-    write({{"event", "stage_started"}, {"stage", stage}});
-  }
-  void stage_advanced(std::string_view stage, double fraction) override {
-    write({{"event", "stage_advanced"}, {"stage", stage}, {"fraction", fraction}});
-  }
-  void stage_finished(std::string_view stage, double seconds) override {
-    write({{"event", "stage_finished"}, {"stage", stage}, {"seconds", seconds}});
+  void job_planned(const std::vector<PlannedStage>& stages) override {
+    TimedProgress::job_planned(stages);
+    nlohmann::ordered_json list = nlohmann::ordered_json::array();
+    for (const PlannedStage& stage : stages) {
+      list.push_back({{"stage", stage.stage}, {"seconds", stage.seconds}});
+    }
+    write({{"event", "job_planned"}, {"stages", std::move(list)}});
   }
   void notice(std::string_view message) override {
     write({{"event", "notice"}, {"message", message}});
   }
 
+ protected:
+  void show_started(std::string_view stage) override {
+    write({{"event", "stage_started"}, {"stage", stage}});
+  }
+  void show_advanced(std::string_view stage, double fraction) override {
+    write({{"event", "stage_advanced"}, {"stage", stage}, {"fraction", fraction}});
+  }
+  void show_finished(std::string_view stage, double seconds) override {
+    write({{"event", "stage_finished"}, {"stage", stage}, {"seconds", seconds}});
+  }
+
  private:
-  static void write(const nlohmann::ordered_json& line) {
+  void write(nlohmann::ordered_json line) const {
+    if (const std::optional<double> left = job_seconds_left(); left && line.contains("stage")) {
+      line["job_seconds_left"] = *left;
+    }
     constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
     fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, kReplace));
   }

@@ -5,8 +5,15 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace vggtcd {
+
+// A stage that is still to come, and how long it is expected to take.
+struct PlannedStage {
+  std::string stage;
+  double seconds = 0;
+};
 
 // Receives progress. All calls come from the thread that called the library.
 class ProgressSink {
@@ -18,6 +25,9 @@ class ProgressSink {
   virtual void stage_finished(std::string_view stage, double seconds) = 0;
   // Something the user should know but that stops nothing, e.g. a frame that was skipped.
   virtual void notice(std::string_view message) = 0;
+  // The stages from here to the end of the job, in order; a later call replaces it. A stage whose
+  // result an earlier run has left may be passed over.
+  virtual void job_planned(const std::vector<PlannedStage>&) {}
 };
 
 // A sink that drops everything; what a library uses when it is given none.

@@ -341,6 +341,14 @@ bool prediction_has_images(const std::filesystem::path& path) {
   return !images_key(NpzReader(path)).empty();
 }
 
+PredictionSize prediction_size(const std::filesystem::path& path) {
+  const NpzReader npz(path);
+  const PredictionLayout layout = find_layout(npz);
+  check_limits(npz, layout, PredictionLimits().min_frames);
+  return {static_cast<int>(layout.frames), static_cast<int>(layout.width),
+          static_cast<int>(layout.height)};
+}
+
 JointReconstruction read_joint(const std::filesystem::path& path, const Reconstruction& before,
                                const Reconstruction& after, ProgressSink& progress) {
   const NpzReader npz(path);

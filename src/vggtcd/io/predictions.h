@@ -26,6 +26,12 @@ Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSi
 // Error{kInput} if it cannot be read.
 bool prediction_has_images(const std::filesystem::path& path);
 
+// What the headers say. Throws Error{kInput} if the file is not a prediction.
+struct PredictionSize {
+  int frames = 0, width = 0, height = 0;
+};
+PredictionSize prediction_size(const std::filesystem::path& path);
+
 // Reads the joint pass over keyframes of `before` and `after`: the same, with keyframes_t1 and
 // keyframes_t2. Throws Error{kInput} unless these are distinct frame numbers of the two epochs, one
 // for each frame, and all three passes have one frame size.

@@ -25,16 +25,18 @@ Image image_of(const cv::Mat& bgr) {
   return image;
 }
 
-// Calls use(number, frame) for every frame; returns how many there are.
-template <typename Use>
-int for_each_frame(const std::string& path, const Use& use) {
+// Calls use(number, frame) for every frame, and advance(share); returns how many frames there are.
+template <typename Use, typename Advance>
+int for_each_frame(const std::string& path, const Use& use, const Advance& advance) {
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // we say ourselves what is wrong
   // One backend, not whichever OpenCV finds first: they count and seek frames differently.
   cv::VideoCapture video(path, cv::CAP_FFMPEG);
+  const double expected = video.isOpened() ? video.get(cv::CAP_PROP_FRAME_COUNT) : 0;  // a guess
   int count = 0;
   for (cv::Mat frame; video.isOpened() && video.read(frame); ++count) {
     throw_if_interrupted();
     use(count, frame);
+    if (expected > 0) advance(std::min(1.0, (count + 1) / expected));
   }
   return count;
 }
@@ -44,19 +46,21 @@ int for_each_frame(const std::string& path, const Use& use) {
 std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSink& progress) {
   ProgressStage stage(progress, "read video");
   std::vector<double> sharp;
-  const int count = for_each_frame(path, [&](int, const cv::Mat& frame) {
-    // A quarter of the size is enough to rank by, and sixteen times faster.
-    cv::Mat small;
-    cv::resize(frame, small, {}, 0.25, 0.25, cv::INTER_AREA);
-    sharp.push_back(sharpness(image_of(small)));
-  });
+  const int count = for_each_frame(
+      path,
+      [&](int, const cv::Mat& frame) {
+        // A quarter of the size is enough to rank by, and sixteen times faster.
+        cv::Mat small;
+        cv::resize(frame, small, {}, 0.25, 0.25, cv::INTER_AREA);
+        sharp.push_back(sharpness(image_of(small)));
+      },
+      [&](double share) { stage.advance(0.5 * share); });
   if (count == 0) {
     throw_error(ErrorCode::kInput,
                 "{}: expected a video, found no frame that can be decoded; convert it, or extract "
                 "photos from it (ffmpeg -i VIDEO photos/%04d.jpg)",
                 path);
   }
-  stage.advance(0.5);
   const int wanted = std::min(frames, count);
   std::vector<int> chosen;
   for (int i = 0; i < wanted; ++i) {
@@ -66,12 +70,16 @@ std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSi
   }
   std::vector<PhotoRef> photos;
   const std::filesystem::path file(path);
-  for_each_frame(path, [&](int number, const cv::Mat& frame) {
-    if (!std::binary_search(chosen.begin(), chosen.end(), number)) return;
-    photos.push_back(
-        {path, fmt::format("{}_{:06d}{}", file.stem().string(), number, file.extension().string()),
-         std::make_shared<const Image>(image_of(frame))});
-  });
+  for_each_frame(
+      path,
+      [&](int number, const cv::Mat& frame) {
+        if (!std::binary_search(chosen.begin(), chosen.end(), number)) return;
+        photos.push_back(
+            {path,
+             fmt::format("{}_{:06d}{}", file.stem().string(), number, file.extension().string()),
+             std::make_shared<const Image>(image_of(frame))});
+      },
+      [&](double share) { stage.advance(0.5 + 0.5 * share); });
   return photos;
 }
 #else

@@ -10,6 +10,7 @@
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/pipeline/change_list.h"
+#include "vggtcd/pipeline/job_plan.h"
 #include "vggtcd/pipeline/results.h"
 #include "vggtcd/registration/shared_intrinsics.h"
 #include "vggtcd/report/read_results.h"
@@ -77,24 +78,40 @@ Json summary_head(const char* command, const EpochInputs& inputs, const Epochs& 
           {"inputs", inputs_json(inputs, epochs)}};
 }
 
-bool by_free_space(const EpochInputs& inputs, const DetectOptions& options) {
-  if (options.change_method != ChangeMethod::kAuto) {
-    return options.change_method == ChangeMethod::kFreeSpace;
-  }
-  const AlignmentMethod method = options.alignment.method;
-  return inputs.has_holes || method == AlignmentMethod::kAuto || method == AlignmentMethod::kRobust;
-}
-
 // Asked before the work starts, so that a question without an answer costs nothing.
 std::optional<PixelQuestion> question_of(const EpochInputs& inputs, const DetectOptions& options,
                                          const Epochs& epochs) {
   if (options.explain.empty()) return {};
-  if (!by_free_space(inputs, options)) {
+  if (!decides_by_votes(options, inputs.has_holes)) {
     throw_error(ErrorCode::kUsage,
                 "explain: photos vote only where free space decides, and here the distance does; "
                 "add --change-method free_space");
   }
   return parse_pixel_question(options.explain, epochs.before, epochs.after);
+}
+
+// Shows the progress of an inner stage as that of the outer one.
+class FractionsOf : public ProgressSink {
+ public:
+  explicit FractionsOf(ProgressStage& outer) : outer_(outer) {}
+  void stage_started(std::string_view) override {}
+  void stage_advanced(std::string_view, double fraction) override { outer_.advance(fraction); }
+  void stage_finished(std::string_view, double) override {}
+  void notice(std::string_view) override {}
+
+ private:
+  ProgressStage& outer_;
+};
+
+// What is left of the job once its sizes are known.
+void announce(const Epochs& epochs, const EpochInputs& inputs, const DetectOptions& options,
+              ProgressSink& progress) {
+  const JobSize size{epochs.before.num_frames(), epochs.after.num_frames(), epochs.before.width,
+                     epochs.before.height};
+  std::vector<PlannedStage> stages =
+      plan_detect(size, options, decides_by_votes(options, inputs.has_holes));
+  stages.erase(stages.begin());  // reading is done
+  progress.job_planned(stages);
 }
 
 // The uncertainty of the registration where it is known: the mean over the axes of the
@@ -112,6 +129,14 @@ std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
                                                       {ChangeMethod::kDistance, "distance"},
                                                       {ChangeMethod::kFreeSpace, "free_space"}};
   return kNames;
+}
+
+bool decides_by_votes(const DetectOptions& options, bool has_holes) {
+  if (options.change_method != ChangeMethod::kAuto) {
+    return options.change_method == ChangeMethod::kFreeSpace;
+  }
+  const AlignmentMethod method = options.alignment.method;
+  return has_holes || method == AlignmentMethod::kAuto || method == AlignmentMethod::kRobust;
 }
 
 void DetectOptions::validate() const {
@@ -135,6 +160,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   Json summary = summary_head("detect", inputs, epochs);
   if (!inputs.origin.empty()) summary["reconstruction"] = inputs.origin;
 
+  announce(epochs, inputs, options, progress);
   const std::optional<PixelQuestion> question = question_of(inputs, options, epochs);
 
   // 2. Align: coarse, fine.
@@ -149,12 +175,13 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   log.run("change detection", [&](ProgressStage&) {
     changes = detect_changes(epochs.before, epochs.after, t2_from_t1, options.change);
   });
-  if (by_free_space(inputs, options)) {
+  if (decides_by_votes(options, inputs.has_holes)) {
     answers.emplace(aside);
-    log.run("free-space votes", [&](ProgressStage&) {
+    log.run("free-space votes", [&](ProgressStage& stage) {
+      FractionsOf fractions(stage);
       FreeSpaceChange votes =
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
-                             registration_sigma_u(outcome.alignment), silent_progress(),
+                             registration_sigma_u(outcome.alignment), fractions,
                              question ? &*question : nullptr, answers->sink());
       outcome.explanation = std::move(votes.explanation);
       decide_by_labels(std::move(votes), changes);

@@ -67,6 +67,9 @@ struct DetectOptions {
   void validate() const;
 };
 
+// Whether detect() lets the votes decide, for depth with or without holes.
+bool decides_by_votes(const DetectOptions& options, bool has_holes);
+
 // Aligns, finds the changes and writes everything that docs/formats.md lists under "Results of
 // detect" into `out`, which appears when it is complete. Returns the alignment verdict's sentence
 // and the changed shares for the terminal.

@@ -12,6 +12,7 @@
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/predictions.h"
+#include "vggtcd/pipeline/job_plan.h"
 
 namespace vggtcd {
 namespace {
@@ -110,6 +111,27 @@ void remove_partial_files(const fs::path& folder) {
   for (const fs::path& path : partial) fs::remove(path);
 }
 
+JobSize job_size(const ReconstructionPlan& plan) {
+  return {plan.frames_before, plan.frames_after, plan.width, plan.height};
+}
+
+std::vector<PlannedStage> whole_job(const ReconstructionPlan& plan, const DetectOptions& options,
+                                    bool votes) {
+  std::vector<PlannedStage> stages = plan.stages;
+  const std::vector<PlannedStage> results = plan_detect(job_size(plan), options, votes);
+  stages.insert(stages.end(), results.begin(), results.end());
+  return stages;
+}
+
+std::string memory_and_time(int64_t memory_bytes, const std::vector<PlannedStage>& stages) {
+  return fmt::format(
+      "Memory: about {:.1f} GB ({:.1f} GB available)\n"
+      "Time: about {} with {} threads; other machines differ by a factor of two or three\n",
+      static_cast<double>(memory_bytes) * 1e-9,
+      static_cast<double>(available_memory_bytes()) * 1e-9, rough_duration(total_seconds(stages)),
+      num_threads());
+}
+
 }  // namespace
 
 PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress) {
@@ -137,27 +159,36 @@ PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress)
   return photos;
 }
 
-std::string describe_plan(const PhotoInputs& inputs, ProgressSink& progress) {
+std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& options,
+                          ProgressSink& progress) {
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   const ReconstructionPlan plan = reconstructor->plan(photos);
-  constexpr double kWithResults = 1.1;  // alignment, change and results: a tenth, measured
-  const double seconds = kWithResults * plan.seconds;
-  const std::string time =
-      seconds < 90 ? fmt::format("{:.0f} s", seconds) : fmt::format("{:.0f} min", seconds / 60);
+  reconstructor->check_photos(photos, progress);
+  const bool votes = decides_by_votes(options, reconstructor->leaves_holes());
+  const int64_t memory = std::max(plan.memory_bytes, detect_memory_bytes(job_size(plan), votes));
   return fmt::format(
       "Reconstructor: {}\n"
       "Photos: {} before, {} after, {} in the joint reconstruction\n"
-      "Frames: {} x {} px\n"
-      "Memory: about {:.1f} GB ({:.1f} GB available)\n"
-      "Time: about {} with {} threads; other machines differ by a factor of two or three\n",
+      "Frames: {} x {} px\n{}",
       plan.note, plan.frames_before, plan.frames_after, plan.frames_joint, plan.width, plan.height,
-      static_cast<double>(plan.memory_bytes) * 1e-9,
-      static_cast<double>(available_memory_bytes()) * 1e-9, time, num_threads());
+      memory_and_time(memory, whole_job(plan, options, votes)));
 }
 
-ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path& out,
-                                       ProgressSink& progress) {
+std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options) {
+  const PredictionSize before = prediction_size(inputs.before);
+  const PredictionSize after = prediction_size(inputs.after);
+  const JobSize size{before.frames, after.frames, before.width, before.height};
+  const bool votes = decides_by_votes(options, false);
+  return fmt::format(
+      "Predictions: {} frames before, {} after\n"
+      "Frames: {} x {} px before, {} x {} px after\n{}",
+      before.frames, after.frames, before.width, before.height, after.width, after.height,
+      memory_and_time(detect_memory_bytes(size, votes), plan_detect(size, options, votes)));
+}
+
+ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOptions& options,
+                                       const fs::path& out, ProgressSink& progress) {
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   claim(out);
@@ -171,6 +202,8 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const fs::path
   } else {
     fs::create_directories(kept);
     remove_partial_files(kept);
+    progress.job_planned(whole_job(reconstructor->plan(photos), options,
+                                   decides_by_votes(options, reconstructor->leaves_holes())));
     const std::string explanation = reconstructor->reconstruct(photos, kept, progress);
     // Written last: the stage is complete when it is there.
     write_json_file(complete,

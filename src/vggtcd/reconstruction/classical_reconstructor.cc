@@ -31,7 +31,8 @@ FrameSize frame_size(int photo_width, int photo_height, int side) {
 }
 
 // Seconds of one thread of a Zen 5 server, measured on the generated scenes of docs/benchmark.md.
-constexpr double kSecondsPerPhoto = 0.28;         // read, key points
+constexpr double kReadSecondsPerPixel = 2e-8;  // decode, reduce
+constexpr double kKeyPointSecondsPerPixel = 3.3e-7;
 constexpr double kSecondsPerPair = 0.05;          // matching
 constexpr double kSecondsPerPlaced = 0.6;         // COLMAP, which runs with one thread
 constexpr double kSecondsPerPlanePixel = 7.5e-8;  // depth: a pixel of a plane
@@ -273,14 +274,29 @@ ReconstructionPlan ClassicalReconstructor::plan(const PhotoEpochs& photos) const
   const double volume = pixels * planes * 3.2;
   plan.memory_bytes =
       static_cast<int64_t>(volume * num_threads() + frames * (pixels * 40 + 4e6) + 3e8);
+  const double threads = num_threads();
   const double pairs = frames * (frames - 1) / 2;
-  const double parallel = kSecondsPerPhoto * frames + kSecondsPerPair * pairs +
-                          kSecondsPerPlanePixel * pixels * planes * frames;
-  plan.seconds = parallel / num_threads() + kSecondsPerPlaced * frames;
+  const double photo_pixels = static_cast<double>(first.width) * first.height;
+  const double reduction = std::min(
+      1.0, static_cast<double>(options_.sfm.max_side_px) / std::max(first.width, first.height));
+  const double reduced_pixels = photo_pixels * reduction * reduction;
+  const auto depth = [&](int count) {
+    return kSecondsPerPlanePixel * pixels * planes * count / threads;
+  };
+  plan.stages = {{"read photos", kReadSecondsPerPixel * photo_pixels * frames / threads},
+                 {"key points", kKeyPointSecondsPerPixel * reduced_pixels * frames / threads},
+                 {"matching", kSecondsPerPair * pairs / threads},
+                 {"structure from motion", kSecondsPerPlaced * frames},
+                 {"before: depth", depth(plan.frames_before)},
+                 {"after: depth", depth(plan.frames_after)}};
   plan.note =
       "classical: COLMAP over both epochs, plane-sweep depth from photos of the same epoch; time "
       "at rates measured on a Zen 5 server, with photos full of detail";
   return plan;
+}
+
+void ClassicalReconstructor::check_photos(const PhotoEpochs& photos, ProgressSink& progress) const {
+  load(photos, options_.sfm.max_side_px, progress);
 }
 
 std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const fs::path& folder,

@@ -30,6 +30,7 @@ class ClassicalReconstructor : public Reconstructor {
   bool leaves_holes() const override { return true; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
+  void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const override;
   std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
                           ProgressSink& progress) const override;
 

@@ -35,10 +35,10 @@ struct PhotoEpochs {
 // What reconstruct() would do, for --dry-run.
 struct ReconstructionPlan {
   int frames_before = 0, frames_after = 0, frames_joint = 0;
-  int width = 0, height = 0;  // of a frame
-  int64_t memory_bytes = 0;   // estimated peak
-  double seconds = 0;         // estimated
-  std::string note;           // what will be done, and what the estimate of time stands on
+  int width = 0, height = 0;         // of a frame
+  int64_t memory_bytes = 0;          // estimated peak
+  std::vector<PlannedStage> stages;  // with estimated times
+  std::string note;                  // what will be done, and what the estimate of time stands on
 };
 
 // What reconstruct() leaves in its folder, prediction files (docs/formats.md).
@@ -53,7 +53,11 @@ class Reconstructor {
   // Whether depth is missing where it was hard to find; a hole is unknown, never changed.
   virtual bool leaves_holes() const = 0;
   virtual std::string fingerprint() const = 0;  // all that its result depends on besides the photos
+  // Reads no more than one photo.
   virtual ReconstructionPlan plan(const PhotoEpochs& photos) const = 0;
+  // Reads all photos and throws what reconstruct() would throw before its long stages: for a photo
+  // that cannot be decoded, and for photos that do not go together.
+  virtual void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const = 0;
   // Writes before.npz and after.npz, of the epochs that are not given, and joint.npz into `folder`,
   // each when it is complete; what an earlier call with the same photos and fingerprint left there
   // is used. Files and folders of other names there are its own. Same photos and fingerprint, same
@@ -77,6 +81,7 @@ class PrefixedProgress : public ProgressSink {
     sink_.stage_finished(named(stage), seconds);
   }
   void notice(std::string_view message) override { sink_.notice(message); }
+  void job_planned(const std::vector<PlannedStage>& stages) override { sink_.job_planned(stages); }
 
  private:
   std::string named(std::string_view stage) const { return prefix_ + std::string(stage); }

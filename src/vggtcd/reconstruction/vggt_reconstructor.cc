@@ -28,15 +28,14 @@ Image fitted(const PhotoRef& photo, const ImageReadOptions& read, int side) {
 }
 
 // The images of a given prediction are frames already.
-Frames frames_of(const EpochPhotos& epoch, const ImageReadOptions& read, int side,
-                 ProgressStage& stage) {
+Frames frames_of(const EpochPhotos& epoch, const ImageReadOptions& read, int side, size_t done,
+                 size_t of_all, ProgressStage& stage) {
   Frames frames;
   for (const PhotoRef& photo : epoch.photos) {
     throw_if_interrupted();
     frames.images.push_back(epoch.given ? load_photo(photo, read) : fitted(photo, read, side));
     frames.names.push_back(photo.name);
-    stage.advance(static_cast<double>(frames.images.size()) /
-                  static_cast<double>(epoch.photos.size()));
+    stage.advance(static_cast<double>(done + frames.images.size()) / static_cast<double>(of_all));
   }
   return frames;
 }
@@ -50,6 +49,19 @@ void require_one_size(const Frames& frames, const Image& model, const std::strin
                 "orientation: turn, crop or leave out the others",
                 frames.names[i], image.width, image.height, model_name, model.width, model.height);
   }
+}
+
+// Both epochs, all frames of one size: that of a given prediction, else of the first photo.
+std::pair<Frames, Frames> read_epochs(const PhotoEpochs& photos, int side, ProgressSink& progress) {
+  ProgressStage stage(progress, "read photos");
+  const size_t num_before = photos.before.photos.size();
+  const size_t all = num_before + photos.after.photos.size();
+  Frames before = frames_of(photos.before, photos.read, side, 0, all, stage);
+  Frames after = frames_of(photos.after, photos.read, side, num_before, all, stage);
+  const Frames& first = photos.before.given || !photos.after.given ? before : after;
+  require_one_size(before, first.images.front(), first.names.front());
+  require_one_size(after, first.images.front(), first.names.front());
+  return {std::move(before), std::move(after)};
 }
 
 int side_of(const PhotoEpochs& photos, int side, const VggtConfig& config) {
@@ -145,16 +157,35 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
   plan.width = first.width;
   plan.height = first.height;
   const bool bf16 = resolve_precision(options_.network.precision) == Precision::kBf16;
-  double flop = 0;
-  for (const int frames : {passes.before, passes.after, passes.joint}) {
-    if (frames == 0) continue;
-    const VggtRun run{.frames = frames, .height = first.height, .width = first.width, .bf16 = bf16};
-    flop += cost_of(config, run).total_flop();
-    plan.memory_bytes = std::max(plan.memory_bytes, memory_of(config, run).total());
-  }
   // Measured with the full network, 10 frames of 518 x 392 px, on two cores of a Zen 5.
   const double flop_per_thread_second = bf16 ? 3.2e11 : 2.0e11;
-  plan.seconds = flop / (flop_per_thread_second * num_threads());
+  constexpr double kReadSecondsPerPhoto = 0.05, kWeightsSeconds = 1.5;
+  constexpr double kFrameSeconds = 0.05;  // outside of the products, of a small network
+  plan.stages = {{"read photos", kReadSecondsPerPhoto * (plan.frames_before + plan.frames_after)},
+                 {"weights", kWeightsSeconds}};
+  double flop = 0;
+  struct Pass {
+    const char* name;
+    int frames;
+  };
+  for (const Pass& pass :
+       {Pass{"before", passes.before}, Pass{"after", passes.after}, Pass{"joint", passes.joint}}) {
+    if (pass.frames == 0) continue;
+    const VggtRun run{
+        .frames = pass.frames, .height = first.height, .width = first.width, .bf16 = bf16};
+    const VggtCost cost = cost_of(config, run);
+    flop += cost.total_flop();
+    plan.memory_bytes = std::max(plan.memory_bytes, memory_of(config, run).total());
+    const auto add = [&](std::string_view stage, double stage_flop, double others) {
+      plan.stages.push_back({fmt::format("{}: {}", pass.name, stage),
+                             others + stage_flop / (flop_per_thread_second * num_threads())});
+    };
+    const double cameras = cost.flop_of(VggtStage::kCameras);
+    const double depth = cost.flop_of(VggtStage::kDepth);
+    add("network", cost.total_flop() - cameras - depth, 0);
+    add(stage_name(VggtStage::kCameras), cameras, 0);
+    add(stage_name(VggtStage::kDepth), depth, kFrameSeconds * pass.frames);
+  }
   plan.note = fmt::format(
       "vggt: {:.1f} TFLOP in {} passes, {}; time at {:.1f} TFLOP/s per thread, measured on a Zen 5 "
       "server",
@@ -163,22 +194,21 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
   return plan;
 }
 
+void VggtReconstructor::check_photos(const PhotoEpochs& photos, ProgressSink& progress) const {
+  const int side = side_of(photos, options_.frame_side_px, config_of(options_.weights));
+  read_epochs(photos, side, progress);
+}
+
 std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
                                            const std::filesystem::path& folder,
                                            ProgressSink& progress) const {
   const VggtConfig config = config_of(options_.weights);
   const int side = side_of(photos, options_.frame_side_px, config);
-  Frames before, after;
-  {
-    ProgressStage stage(progress, "read photos");
-    before = frames_of(photos.before, photos.read, side, stage);
-    after = frames_of(photos.after, photos.read, side, stage);
-  }
-  const Frames& first = photos.before.given || !photos.after.given ? before : after;
-  require_one_size(before, first.images.front(), first.names.front());
-  require_one_size(after, first.images.front(), first.names.front());
+  const std::pair<Frames, Frames> epochs = read_epochs(photos, side, progress);
+  const Frames& before = epochs.first;
+  const Frames& after = epochs.second;
   const PassSizes passes_to_run = pass_sizes(photos, options_.keyframes);
-  const Image& model = first.images.front();
+  const Image& model = before.images.front();
   const bool bf16 = resolve_precision(options_.network.precision) == Precision::kBf16;
   throw_unless_fits(plan_memory(config,
                                 {.frames = passes_to_run.largest(),

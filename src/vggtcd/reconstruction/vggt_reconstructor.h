@@ -24,6 +24,7 @@ class VggtReconstructor : public Reconstructor {
   bool leaves_holes() const override { return false; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
+  void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const override;
   std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
                           ProgressSink& progress) const override;
 
