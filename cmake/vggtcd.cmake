@@ -50,6 +50,7 @@ endfunction()
 # vggtcd_test(NAME SOURCES a_test.cc ... [DEPS ...] [LABELS unit] [TIMEOUT 60])
 # One GoogleTest program; every TEST in it becomes a ctest test of that label.
 # The tests see VGGTCD_SOURCE_DIR, the root of the checkout, for golden data.
+# The target unit_tests builds those labelled unit and nothing else.
 function(vggtcd_test name)
   if(NOT VGGTCD_BUILD_TESTS)
     return()
@@ -73,6 +74,12 @@ function(vggtcd_test name)
   endforeach()
   target_link_libraries(${name} PRIVATE ${arg_DEPS} GTest::gmock GTest::gtest_main)
   vggtcd_compile_options(${name})
+  if("unit" IN_LIST arg_LABELS)
+    if(NOT TARGET unit_tests)
+      add_custom_target(unit_tests)
+    endif()
+    add_dependencies(unit_tests ${name})
+  endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
     PROPERTIES LABELS "${arg_LABELS}" TIMEOUT ${arg_TIMEOUT})
 endfunction()

@@ -56,8 +56,6 @@ Range range_of(const TensorSpec& spec, int64_t index) {
   return rounded(0, 0.5);
 }
 
-constexpr size_t kHugePage = size_t{2} << 20;
-
 int64_t numel(const std::vector<int64_t>& shape) {
   return std::accumulate(shape.begin(), shape.end(), int64_t{1}, std::multiplies<>());
 }

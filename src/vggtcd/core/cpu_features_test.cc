@@ -48,7 +48,7 @@ TEST(CpuLevel, ScopesNestAndRestore) {
 
 TEST(CpuLevel, CannotBeForcedBeyondTheProcessor) {
   if (detected_cpu_level() == CpuLevel::kAvx512Bf16) GTEST_SKIP() << "has every level";
-  EXPECT_THROW(ScopedCpuLevel(CpuLevel::kAvx512Bf16), Error);
+  EXPECT_THROW(ScopedCpuLevel{CpuLevel::kAvx512Bf16}, Error);
 }
 
 // The variable is read once in a process: in a child that has not yet asked. EXPECT_EXIT forks.

@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(ThreadsAndInstructionSets, NearestNeighborsEverywhere,
                          });
 
 TEST(NearestNeighborIndex, WithoutTargetsNothingIsWithinAnyBound) {
-  const NearestNeighborIndex index({});
+  const NearestNeighborIndex index(Points{});
   EXPECT_EQ(index.size(), 0u);
   const NearestNeighbors found = index.query(Points{{1, 2, 3}}, kNoBound);
   EXPECT_EQ(found.distance[0], kNoBound);

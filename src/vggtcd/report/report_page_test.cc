@@ -119,7 +119,7 @@ ReportInput example(size_t points_per_epoch, int photos = 2) {
     epoch->image = [](int i) {
       Image image(40, 30);
       for (size_t k = 0; k < image.rgb.size(); ++k)
-        image.rgb[k] = static_cast<uint8_t>(80 + 40 * i + k % 3);
+        image.rgb[k] = static_cast<uint8_t>(80 + 40 * i + static_cast<int>(k % 3));
       return image;
     };
   }

@@ -49,7 +49,8 @@ Eigen::Vector3d true_point(const EpochTruth& truth, size_t pixel) {
 }
 
 TEST(SimulatePass, WithoutErrorsIsTheTruthInItsOwnFrame) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   SimulatedPredictions p = simulate_predictions(scene, truth, 3, no_errors());
   EXPECT_NEAR(p.t2_from_t1().scale, scene.scale_t2_from_t1, 1e-12);
   for (const Epoch which : kEpochs) {
@@ -71,7 +72,8 @@ TEST(SimulatePass, WithoutErrorsIsTheTruthInItsOwnFrame) {
 }
 
 TEST(SimulatePass, BestFitIsTheNominalSim3WithoutErrors) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   ErrorModel errors = no_errors();
   errors.confidence_noise = 0.3;  // else most confidences tie
   const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
@@ -90,7 +92,8 @@ std::vector<FrameRef> frames_of(Epoch which, int count) {
 }
 
 TEST(SimulatePass, ErrsMoreWithFewPhotosAndWithTwoStates) {
-  const auto& [scene, truth] = fixture();
+  const auto& scene = fixture().scene;
+  const auto& truth = fixture().truth;
   ErrorModel errors = no_errors();
   errors.drift_translation = 0.01;
   errors.few_views = 3;
@@ -111,7 +114,8 @@ TEST(SimulatePass, ErrsMoreWithFewPhotosAndWithTwoStates) {
 }
 
 TEST(SimulatePass, PointsStayInPlaceWhenPoseAndDepthAgree) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   const EpochTruth& epoch = truth.of(Epoch::kT1);
   // What is left of the points' errors after the best similarity, relative to the cameras'.
   const auto points_against_cameras = [&](double consistency) {
@@ -143,7 +147,8 @@ TEST(SimulatePass, PointsStayInPlaceWhenPoseAndDepthAgree) {
 }
 
 TEST(SimulatePass, EachPassDrawsItsOwnErrors) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   const SimulatedPredictions p = simulate_predictions(scene, truth, 3, ErrorModel{});
   // Frame 0 of T1 is frame 0 of the joint pass too; scales differ, so compare depth ratios.
   const float scale = p.joint.reconstruction.depth[0] / p.t1.reconstruction.depth[0];
@@ -203,12 +208,13 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
 }
 
 TEST(SimulatePass, ConfidenceAnticorrelatesWithErrorButDoesNotTellIt) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   std::vector<FrameRef> frames;
   for (int k = 0; k < 10; ++k) frames.push_back({Epoch::kT1, k});
   const EpochTruth& epoch = truth.of(Epoch::kT1);
   double mean = 0;
-  for (const uint64_t draw : {1, 2, 3, 4, 5, 6}) {
+  for (const uint64_t draw : {1u, 2u, 3u, 4u, 5u, 6u}) {
     const SimulatedPass pass = simulate_pass(truth, frames, 0.5, ErrorModel{}, scene.key, draw);
     std::vector<double> errors, confidences;
     for (size_t pixel = 0; pixel < epoch.depth_m.size(); ++pixel) {
@@ -224,7 +230,8 @@ TEST(SimulatePass, ConfidenceAnticorrelatesWithErrorButDoesNotTellIt) {
 }
 
 TEST(SimulatePass, EdgesHavePointsThatFlyBetweenFrontAndBack) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   ErrorModel errors = no_errors();
   errors.edge_blur_px = 1.5;
   const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
@@ -254,7 +261,8 @@ TEST(SimulatePass, EdgesHavePointsThatFlyBetweenFrontAndBack) {
 }
 
 TEST(SimulatePass, OutlierFramesAreFarOffAndLessSure) {
-  const auto& [scene, truth] = fixture();
+  const SyntheticScene& scene = fixture().scene;
+  const SceneTruth& truth = fixture().truth;
   ErrorModel errors;
   errors.outlier_share = 0.5;
   const SimulatedPredictions p = simulate_predictions(scene, truth, 3, errors);
