@@ -38,6 +38,53 @@ def write_photo(path, seed, width=96, height=64):
     path.write_bytes(b"P6 %d %d 255\n" % (width, height) + pixels)
 
 
+def write_rgb(path, gray):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    rgb = np.repeat(np.clip(gray, 0, 255).astype("u1")[:, :, None], 3, axis=2)
+    path.write_bytes(b"P6 %d %d 255\n" % (gray.shape[1], gray.shape[0]) + rgb.tobytes())
+
+
+FOCAL, WIDTH, HEIGHT = 500.0, 480, 360
+
+
+def places(count):
+    """Where photos are taken, in metres: a walk to the right, up and down."""
+    return [np.array([0.3 * k, 0.15 * (-1) ** k, 0.05 * k]) for k in range(count)]
+
+
+def wall(rng):
+    """A texture of all sizes, 1 cm a pixel."""
+    texture = np.zeros((1024, 1024))
+    for size in (4, 16, 64, 256, 1024):
+        texture += np.kron(rng.uniform(0, 60, (size, size)), np.ones((1024 // size,) * 2))
+    return texture
+
+
+def photo_of_wall(texture, place, yaw=0.0, distance=5.0):
+    u, v = np.meshgrid(np.arange(WIDTH) - WIDTH / 2, np.arange(HEIGHT) - HEIGHT / 2)
+    c, s = np.cos(yaw), np.sin(yaw)
+    ray = np.stack([c * u / FOCAL + s, v / FOCAL, c - s * u / FOCAL])
+    scale = (distance - place[2]) / ray[2]
+    x, y = (100 * (place[k] + scale * ray[k]) + 400 for k in (0, 1))
+    i, j = np.floor(y).astype(int), np.floor(x).astype(int)
+    dy, dx = y - i, x - j
+    at = lambda a, b: texture[a % 1024, b % 1024]
+    return ((1 - dy) * ((1 - dx) * at(i, j) + dx * at(i, j + 1)) +
+            dy * ((1 - dx) * at(i + 1, j) + dx * at(i + 1, j + 1)))
+
+
+def photo_of_stamps(stamps, place):
+    """Small textured stamps that hang in the dark at all distances: cameras can be found, depth of the dark cannot."""
+    image = np.full((HEIGHT, WIDTH), 20.0)
+    for centre, texture in sorted(stamps, key=lambda stamp: -stamp[0][2]):
+        x, y, z = centre - place
+        half = texture.shape[0] // 2
+        u, v = int(round(FOCAL * x / z + WIDTH / 2)), int(round(FOCAL * y / z + HEIGHT / 2))
+        if half <= u < WIDTH - half and half <= v < HEIGHT - half:
+            image[v - half:v + half, u - half:u + half] = texture
+    return image
+
+
 class BadInput(unittest.TestCase):
     def setUp(self):
         self.temporary = tempfile.TemporaryDirectory()
@@ -78,6 +125,34 @@ class BadInput(unittest.TestCase):
         if not shutil.which("colmap"):
             self.skipTest("no COLMAP")
         self.assertIn("no two of the 6 photos", self.refusal(status=5))
+
+    def write_epochs(self, photo):
+        """photo(k) for a walk, every other one into the after epoch."""
+        for k in range(12):
+            write_rgb(self.root / ("walk_before", "walk_after")[k % 2] / f"{k:02}.ppm", photo(k))
+
+    def walk_refusal(self, side=280):
+        return self.refusal("--frame-side", side, status=5, before="walk_before", after="walk_after")
+
+    @unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
+    def test_a_flat_wall_does_not_determine_depth(self):
+        texture, where = wall(np.random.default_rng(1)), places(12)
+        self.write_epochs(lambda k: photo_of_wall(texture, where[k]))
+        self.assertIn("a plane explains", self.walk_refusal())
+
+    @unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
+    def test_turning_on_the_spot_does_not_determine_depth(self):
+        texture = wall(np.random.default_rng(2))
+        self.write_epochs(lambda k: photo_of_wall(texture, np.zeros(3), yaw=0.05 * (k - 6)))
+        self.assertIn("classical reconstruction refused: ", self.walk_refusal())
+
+    @unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
+    def test_photos_without_depth(self):
+        rng, where = np.random.default_rng(3), places(12)
+        stamps = [(np.array([rng.uniform(-2, 5), rng.uniform(-2, 2), rng.uniform(4, 9)]),
+                   np.kron(rng.uniform(0, 255, (4, 4)), np.ones((3, 3)))) for _ in range(24)]
+        self.write_epochs(lambda k: photo_of_stamps(stamps, where[k]))
+        self.assertIn("photos agree on the depth of", self.walk_refusal(side=476))
 
     def test_missing_weights(self):
         self.assertIn("--reconstructor classical", self.refusal("--reconstructor", "vggt", status=4))
@@ -131,6 +206,14 @@ class BadInput(unittest.TestCase):
     def test_joint_is_for_predictions(self):
         self.assertIn("leave the option out", self.refusal("--joint", "x.npz", status=2))
 
+    def test_a_dry_run_says_what_is_wrong_with_the_photos(self):
+        write_photo(self.root / "after" / "3.ppm", 20, width=64, height=96)
+        line = self.refusal("--dry-run", status=3)
+        self.assertIn("3.ppm is portrait and 0.ppm is landscape; expected photos of one orientation: turn", line)
+        (self.root / "after" / "3.ppm").write_bytes(b"P6 96 64 255\n")
+        self.assertIn("3.ppm: not a readable photo", self.refusal("--dry-run", status=3))
+        self.assertFalse((self.root / "out").exists())
+
     def test_odd_sizes(self):
         self.assertIn("multiple of 14", self.refusal("--frame-side", "150", status=2))
 
@@ -163,6 +246,18 @@ class DryRun(unittest.TestCase):
         text, many = self.plan(self.root / "before", after)
         self.assertIn("3 before, 24 after, 8 in the joint", text)
         self.assertGreater(many, 3 * few)
+
+    def test_predictions_are_planned_from_their_headers(self):
+        poses = np.tile(np.eye(4)[:3], (5, 1, 1))
+        intrinsic = np.tile(np.array([[80.0, 0, 48], [0, 80, 32], [0, 0, 1]]), (5, 1, 1))
+        for name, frames in (("t1", 3), ("t2", 5)):
+            depth = np.ones((frames, 64, 96), "f4")
+            np.savez(self.root / f"{name}.npz", extrinsic=poses[:frames], intrinsic=intrinsic[:frames], depth=depth,
+                     depth_conf=depth)
+        text, _ = self.plan(self.root / "t1.npz", self.root / "t2.npz", "--aligned")
+        self.assertIn("3 frames before, 5 after", text)
+        self.assertIn("96 x 64 px before, 96 x 64 px after", text)
+        self.assertRegex(text, r"Memory: about \d+\.\d GB")
 
     def test_a_video_beside_a_folder(self):
         for i in range(12):

@@ -162,16 +162,6 @@ double known_share(std::span<const float> depth) {
   return static_cast<double>(known) / static_cast<double>(std::max<size_t>(1, depth.size()));
 }
 
-void require_depth(double share, const char* epoch, const TrustOptions& options) {
-  if (share >= options.min_consistent_share) return;
-  throw_error(
-      ErrorCode::kDegenerate,
-      "classical reconstruction refused: photos agree on the depth of {:.0f} % of the pixels of "
-      "the {} epoch, at least {:.0f} % is needed; take more photos from closer together, of "
-      "textured surfaces, or use network weights (--weights)",
-      100 * share, epoch, 100 * options.min_consistent_share);
-}
-
 void append(const EpochTask& task, const SfmResult& sfm, const Frames& frames, size_t i,
             const DepthMap& map, Reconstruction& epoch) {
   const auto add = [](auto& target, const auto& values) {

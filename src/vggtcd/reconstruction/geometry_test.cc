@@ -215,6 +215,14 @@ TEST(RequireTrust, RefusesEachBoundWithItsReason) {
   EXPECT_THAT(refusal([](SfmTrust& t) { t.homography_share = 0.97; }), HasSubstr("plane"));
 }
 
+TEST(RequireDepth, RefusesAnEpochWhosePhotosAgreeOnTooLittle) {
+  require_depth(0.1, "before", {});
+  const std::string said =
+      message_of(ErrorCode::kDegenerate, [] { require_depth(0.0949, "after", {}); });
+  EXPECT_THAT(said, HasSubstr("9 % of the pixels of the after epoch, at least 10 %"));
+  EXPECT_THAT(said, HasSubstr("take more photos from closer together"));
+}
+
 TEST(MeasureTrust, CountsPhotosPointsAnglesAndPlanes) {
   SfmResult sfm = walk({0, 1, 10}, 1);  // 45 degrees between the first and the last
   sfm.model.points[0].x_in_world = {0, 0, 10};

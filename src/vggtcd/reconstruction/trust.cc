@@ -118,4 +118,14 @@ void require_trust(const SfmTrust& trust, const TrustOptions& options) {
   }
 }
 
+void require_depth(double known_share, const char* epoch, const TrustOptions& options) {
+  if (known_share >= options.min_consistent_share) return;
+  throw_error(
+      ErrorCode::kDegenerate,
+      "classical reconstruction refused: photos agree on the depth of {:.0f} % of the pixels of "
+      "the {} epoch, at least {:.0f} % is needed; take more photos from closer together, of "
+      "textured surfaces, or use network weights (--weights)",
+      100 * known_share, epoch, 100 * options.min_consistent_share);
+}
+
 }  // namespace vggtcd

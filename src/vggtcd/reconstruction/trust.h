@@ -34,4 +34,7 @@ SfmTrust measure_trust(const SfmResult& sfm, int photos_t1, int photos_t2);
 // Throws Error{kDegenerate} naming the first bound that is not met.
 void require_trust(const SfmTrust& trust, const TrustOptions& options);
 
+// Throws Error{kDegenerate} if photos agree on the depth of too small a share of an epoch's pixels.
+void require_depth(double known_share, const char* epoch, const TrustOptions& options);
+
 }  // namespace vggtcd
