@@ -7,6 +7,7 @@ Usage: pixels_test.py PROGRAM TEST_MEDIA [unittest arguments]
 import json
 import os
 import pathlib
+import pty
 import shutil
 import signal
 import subprocess
@@ -106,7 +107,7 @@ class Pixels(unittest.TestCase):
         out = self.root / "killed"
         kept = ["matching", "structure from motion", "before: depth", "after: depth"]
         stages = ["read photos", "key points", *kept, "read predictions", "coarse alignment", "fine alignment",
-                  "change detection", "free-space votes", "write results"]
+                  "change detection", "free-space votes", "changed things", "write results"]
         for number, stage in enumerate(stages):
             finished = self.kill_after(stage, out)
             for earlier in set(stages[:number]) & set(kept):
@@ -120,8 +121,10 @@ class Pixels(unittest.TestCase):
             self.assertEqual(killed[name], undisturbed[name], name)
 
     def test_killed_in_the_middle_of_a_stage_it_goes_on_to_the_same_bytes(self):
-        for stage in ("structure from motion", "before: depth"):
+        for stage in ("structure from motion", "before: depth", "free-space votes", "write results"):
             out = self.root / ("within " + stage.replace(": ", " "))
+            if stage in ("free-space votes", "write results"):  # what comes before is kept, and tested above
+                shutil.copytree(self.out, out)
             arguments = [PROGRAM, "detect", *self.photos, "-o", out, *SIZE, "--progress", "json"]
             process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE,
                                        stdout=subprocess.DEVNULL, text=True, env=ENVIRONMENT)
@@ -134,6 +137,37 @@ class Pixels(unittest.TestCase):
             self.assertEqual(process.wait(timeout=100), -signal.SIGKILL)
             must("detect", *self.photos, "-o", out, *SIZE)
             self.assertEqual(content(out), content(self.out))
+
+    def test_a_terminal_shows_the_time_left_of_the_stage_and_of_the_job(self):
+        out = self.root / "terminal"
+        shutil.copytree(self.out, out)
+        ours, theirs = pty.openpty()
+        process = subprocess.Popen(list(map(str, [PROGRAM, "detect", *self.photos, "-o", out, *SIZE])), stderr=theirs,
+                                   stdout=subprocess.DEVNULL, env=ENVIRONMENT)
+        os.close(theirs)
+        shown = b""
+        try:
+            while chunk := os.read(ours, 65536):
+                shown += chunk
+        except OSError:  # Linux: the other end is closed
+            pass
+        os.close(ours)
+        self.assertEqual(process.wait(timeout=100), 0)
+        self.assertIn(b"; about ", shown)
+        self.assertIn(b" s to go", shown)
+        live = [line for line in shown.replace(b"\n", b"\r").split(b"\r") if line.startswith(b"\x1b[K")]
+        self.assertGreater(len(live), 8)
+        self.assertTrue(all(len(line) < 83 for line in live), live)  # 80 columns, else it would wrap
+
+    def test_the_plan_of_the_job_names_its_stages_in_order(self):
+        out = self.root / "planned"
+        done = must("detect", *self.photos, "-o", out, *SIZE, "--progress", "json")
+        events = [json.loads(line) for line in done.stderr.splitlines()]
+        plans = [[stage["stage"] for stage in e["stages"]] for e in events if e["event"] == "job_planned"]
+        finished = [e["stage"] for e in events if e["event"] == "stage_finished"]
+        self.assertEqual(plans[0], finished)
+        self.assertEqual(plans[1], finished[finished.index("coarse alignment"):])
+        self.assertTrue(all("job_seconds_left" in e for e in events if e["event"] == "stage_advanced"))
 
     def test_a_second_run_reconstructs_nothing(self):
         out = self.root / "twice"

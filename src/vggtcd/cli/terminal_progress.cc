@@ -6,6 +6,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -71,8 +72,8 @@ class TimedProgress : public ProgressSink {
   // "; about 1 min 20 s to go", of the whole job.
   std::string job_left_text() const {
     const std::optional<double> left = job_seconds_left();
-    return left && *left >= 0.5 ? fmt::format("; about {} to go", whole_seconds(*left))
-                                : std::string();
+    return left ? fmt::format("; about {} to go", whole_seconds(std::max(1.0, *left)))
+                : std::string();
   }
 
  private:

@@ -239,7 +239,7 @@ void renumber(const EpochPhotos& photos, const Reconstruction& placed,
 
 std::string ClassicalReconstructor::fingerprint() const {
   return fmt::format(
-      "classical 3; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
+      "classical 4; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
       options_.keyframes, options_.frame_side_px, options_.sfm.max_features,
       options_.depth.sweep.num_planes, options_.depth.sweep.best_views, options_.views.max_sources);
 }

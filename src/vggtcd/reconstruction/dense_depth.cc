@@ -86,6 +86,7 @@ DepthMap agreed_depth(size_t view, const std::vector<GrayView>& views,
                                         options.max_difference_planes * plane_step);
       double inverse_sum = 1.0 / depth;
       int agreeing = 0;
+      float least_distinct = swept[view].confidence[i];
       for (size_t k = 0; k < task.sources.size(); ++k) {
         const auto s = static_cast<size_t>(task.sources[k]);
         const Eigen::Vector3d x_in_source = source_from_reference[k] * x;
@@ -102,9 +103,11 @@ DepthMap agreed_depth(size_t view, const std::vector<GrayView>& views,
         const double difference = (other_depth - x_in_source.z()) / x_in_source.z();
         if (std::abs(difference) / depth > tolerance) continue;
         inverse_sum += 1.0 / (depth * (1.0 + difference));
+        least_distinct = std::min(least_distinct, swept[s].confidence[j]);
         ++agreeing;
       }
       if (agreeing < needed) continue;
+      if (agreeing == 1 && least_distinct < options.min_lone_distinctness) continue;
       out.depth[i] = static_cast<float>((agreeing + 1) / inverse_sum);
       out.confidence[i] =
           static_cast<float>(agreeing) + std::min(0.999f, swept[view].confidence[i]);

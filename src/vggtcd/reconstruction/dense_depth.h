@@ -22,6 +22,9 @@ struct DenseDepthOptions {
   int min_patch_px =
       120;  // smaller connected patches of depth are chance agreements, e.g. in a sky
   int min_agreeing_views = 2;  // besides the photo itself; 1 if it has but one or two sources
+  // What a single other photo confirms counts only if both found it distinctly better than any
+  // other depth: on a ribbed cloth two photos agree on the wrong rib.
+  double min_lone_distinctness = 0.25;
 };
 
 // Depth 0: unknown.

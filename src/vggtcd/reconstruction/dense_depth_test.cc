@@ -193,6 +193,25 @@ TEST(AgreedDepth, DropsWhatNoOtherPhotoConfirms) {
   EXPECT_GE(agreed.confidence[patch + 5], 2.5f);
 }
 
+TEST(AgreedDepth, ASingleWitnessCountsOnlyWhereBothPhotosAreDistinct) {
+  const Scene scene = make_scene(2);
+  std::vector<DepthMap> swept;
+  for (const auto& truth : scene.depth) {
+    swept.push_back(
+        {std::vector<float>(truth.begin(), truth.end()), std::vector<float>(truth.size(), 0.5f)});
+  }
+  // In view 0 itself, and all of what view 1 found in its left half.
+  const auto own = static_cast<size_t>(30 * 96 + 80), others = static_cast<size_t>(30 * 96 + 20);
+  swept[0].confidence[own] = 0.1f;
+  for (size_t i = 0; i < swept[1].confidence.size(); ++i) {
+    if (i % 96 < 48) swept[1].confidence[i] = 0.1f;
+  }
+  const DepthMap agreed = agreed_depth(0, scene.views, swept, all_others(2), test_options());
+  EXPECT_EQ(agreed.depth[own], 0);
+  EXPECT_EQ(agreed.depth[others], 0);
+  EXPECT_NEAR(agreed.depth[own + 3], scene.depth[0][own + 3], 0.01);
+}
+
 TEST(RemoveSmallPatches, ForgetsIslandsAndKeepsSlopes) {
   constexpr int kWidth = 12, kHeight = 5;
   DepthMap map{std::vector<float>(kWidth * kHeight), std::vector<float>(kWidth * kHeight, 1.0f)};
