@@ -6,6 +6,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -54,8 +56,30 @@ struct PlyCloud {
   const std::vector<float>* field(std::string_view name) const;
 };
 
-// Reads the vertices of a binary little-endian PLY; other elements must come after them. Throws
-// Error{kInput}.
+// The vertices of a binary little-endian PLY; other elements must come after them. Opening reads
+// the header and compares the file's size with it. Throws Error{kInput}.
+class PlyReader {
+ public:
+  explicit PlyReader(const std::filesystem::path& path);
+  ~PlyReader();
+  PlyReader(const PlyReader&) = delete;
+  PlyReader& operator=(const PlyReader&) = delete;
+
+  size_t size() const;                             // points
+  const std::vector<std::string>& fields() const;  // of PlyCloud
+
+  // The points in file order, in blocks that are as good as none in memory: positions, colours if
+  // the file has them, and the fields of these names, which must be there.
+  void read(std::span<const std::string> fields,
+            const std::function<void(const PlyCloud& block)>& sink) const;
+
+ private:
+  struct Layout;
+  std::filesystem::path path_;
+  std::unique_ptr<const Layout> layout_;
+};
+
+// All of it.
 PlyCloud read_ply(const std::filesystem::path& path);
 
 }  // namespace vggtcd

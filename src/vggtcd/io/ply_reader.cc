@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reading PLY: the header decides the record, the file size must agree before memory is reserved.
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstring>
 #include <fstream>
@@ -11,6 +12,8 @@
 
 namespace vggtcd {
 namespace {
+
+constexpr size_t kBlockPoints = 1 << 15;
 
 struct Property {
   std::string name;
@@ -129,50 +132,106 @@ const std::vector<float>* PlyCloud::field(std::string_view name) const {
   return nullptr;
 }
 
-PlyCloud read_ply(const std::filesystem::path& path) {
+struct PlyReader::Layout {
+  Header header;
+  std::streamoff first_record = 0;
+  std::array<const Property*, 3> position{}, color{};  // of the header; color null: none
+  std::vector<std::string> fields;                     // every other property
+  std::vector<const Property*> properties;             // of the fields
+};
+
+PlyReader::PlyReader(const std::filesystem::path& path) : path_(path) {
   const std::string what = path.string();
   std::ifstream file(path, std::ios::binary);
   if (!file || !std::filesystem::is_regular_file(path)) throw_not_ply(what, "no readable file");
-  const Header header = read_header(file, what);
-  const auto size = static_cast<uint64_t>(std::filesystem::file_size(path));
-  const auto available = size - static_cast<uint64_t>(file.tellg());
+  auto layout = std::make_unique<Layout>();
+  layout->header = read_header(file, what);
+  layout->first_record = file.tellg();
+  const Header& header = layout->header;
+  const auto available =
+      std::filesystem::file_size(path) - static_cast<uint64_t>(layout->first_record);
   const auto points = static_cast<uint64_t>(header.num_points);
   if (points > available / header.record_bytes) {
     throw_error(ErrorCode::kInput, "{}: expected {} points of {} bytes, found {} bytes; truncated",
                 what, points, header.record_bytes, available);
   }
-
-  const Property* position[] = {header.find("x"), header.find("y"), header.find("z")};
-  const Property* color[] = {header.find("red"), header.find("green"), header.find("blue")};
-  const bool has_color = std::all_of(color, color + 3, [](const Property* channel) {
+  layout->position = {header.find("x"), header.find("y"), header.find("z")};
+  layout->color = {header.find("red"), header.find("green"), header.find("blue")};
+  const bool has_color = std::ranges::all_of(layout->color, [](const Property* channel) {
     return channel != nullptr && channel->kind == 'u' && channel->size == 1;
   });
-  std::vector<const Property*> others;
-  PlyCloud cloud;
+  if (!has_color) layout->color = {};
   for (const Property& property : header.properties) {
-    const bool known = std::find(position, position + 3, &property) != position + 3 ||
-                       (has_color && std::find(color, color + 3, &property) != color + 3);
-    if (known) continue;
+    if (std::ranges::find(layout->position, &property) != layout->position.end() ||
+        std::ranges::find(layout->color, &property) != layout->color.end()) {
+      continue;
+    }
     constexpr std::string_view kPrefix = "scalar_";
     const bool prefixed = property.name.starts_with(kPrefix);
-    cloud.fields.push_back({property.name.substr(prefixed ? kPrefix.size() : 0), {}});
-    cloud.fields.back().values.resize(points);
-    others.push_back(&property);
+    layout->fields.push_back(property.name.substr(prefixed ? kPrefix.size() : 0));
+    layout->properties.push_back(&property);
   }
-  cloud.positions.resize(points);
-  cloud.rgb.resize(has_color ? 3 * points : 0);
-  std::vector<char> record(header.record_bytes);
-  for (size_t i = 0; i < points; ++i) {
-    file.read(record.data(), static_cast<std::streamsize>(record.size()));
-    if (!file) throw_not_ply(what, "a read error");
-    for (size_t k = 0; k < 3; ++k) {
-      cloud.positions[i][static_cast<Eigen::Index>(k)] = read_value(*position[k], record.data());
-      if (has_color) cloud.rgb[3 * i + k] = static_cast<uint8_t>(record[color[k]->offset]);
-    }
-    for (size_t k = 0; k < others.size(); ++k) {
-      cloud.fields[k].values[i] = read_value(*others[k], record.data());
-    }
+  layout_ = std::move(layout);
+}
+
+PlyReader::~PlyReader() = default;
+
+size_t PlyReader::size() const { return static_cast<size_t>(layout_->header.num_points); }
+
+const std::vector<std::string>& PlyReader::fields() const { return layout_->fields; }
+
+void PlyReader::read(std::span<const std::string> fields,
+                     const std::function<void(const PlyCloud& block)>& sink) const {
+  const Layout& layout = *layout_;
+  const size_t record_bytes = layout.header.record_bytes;
+  const bool has_color = layout.color[0] != nullptr;
+  std::vector<const Property*> wanted;
+  PlyCloud block;
+  for (const std::string& name : fields) {
+    const auto found = std::ranges::find(layout.fields, name);
+    check(found != layout.fields.end(), "PlyReader: a field that is there");
+    wanted.push_back(layout.properties[static_cast<size_t>(found - layout.fields.begin())]);
+    block.fields.push_back({name, {}});
   }
+  std::ifstream file(path_, std::ios::binary);
+  file.seekg(layout.first_record);
+  std::vector<char> records;
+  for (size_t first = 0; first < size(); first += kBlockPoints) {
+    const size_t points = std::min(kBlockPoints, size() - first);
+    records.resize(points * record_bytes);
+    file.read(records.data(), static_cast<std::streamsize>(records.size()));
+    if (!file) throw_not_ply(path_.string(), "a read error");
+    block.positions.resize(points);
+    block.rgb.resize(has_color ? 3 * points : 0);
+    for (auto& field : block.fields) field.values.resize(points);
+    for (size_t i = 0; i < points; ++i) {
+      const char* record = &records[i * record_bytes];
+      for (size_t k = 0; k < 3; ++k) {
+        block.positions[i][static_cast<Eigen::Index>(k)] = read_value(*layout.position[k], record);
+        if (has_color) block.rgb[3 * i + k] = static_cast<uint8_t>(record[layout.color[k]->offset]);
+      }
+      for (size_t k = 0; k < wanted.size(); ++k) {
+        block.fields[k].values[i] = read_value(*wanted[k], record);
+      }
+    }
+    sink(block);
+  }
+}
+
+PlyCloud read_ply(const std::filesystem::path& path) {
+  const PlyReader reader(path);
+  PlyCloud cloud;
+  for (const std::string& name : reader.fields()) cloud.fields.push_back({name, {}});
+  const auto append = [](auto& all, const auto& block) {
+    all.insert(all.end(), block.begin(), block.end());
+  };
+  reader.read(reader.fields(), [&](const PlyCloud& block) {
+    append(cloud.positions, block.positions);
+    append(cloud.rgb, block.rgb);
+    for (size_t k = 0; k < block.fields.size(); ++k) {
+      append(cloud.fields[k].values, block.fields[k].values);
+    }
+  });
   return cloud;
 }
 

@@ -79,6 +79,36 @@ TEST(ReadPly, ReadsEveryTypeAndIgnoresFaces) {
   EXPECT_THAT(*cloud.field("sign"), ElementsAre(0, -1, -2));
 }
 
+TEST(PlyReader, BlocksJoinedAreTheFileAndHoldOnlyWhatWasAskedFor) {
+  const TemporaryDirectory directory;
+  constexpr size_t kPoints = 70001;
+  PlyWriter writer(directory / "a.ply", kPoints, {"first", "second"});
+  for (size_t i = 0; i < kPoints; ++i) {
+    const float value = static_cast<float>(i);
+    const uint8_t rgb[] = {static_cast<uint8_t>(i), static_cast<uint8_t>(i >> 8), 7};
+    const float values[] = {value, -value};
+    writer.add({value, 0, 1}, rgb, values);
+  }
+  writer.commit();
+  const PlyReader reader(directory / "a.ply");
+  EXPECT_EQ(reader.size(), kPoints);
+  EXPECT_THAT(reader.fields(), ElementsAre("first", "second", "quality"));
+  const std::vector<std::string> fields = {"second"};
+  size_t number = 0;
+  int blocks = 0;
+  reader.read(fields, [&](const PlyCloud& block) {
+    ++blocks;
+    ASSERT_EQ(block.fields.size(), 1u);
+    for (size_t i = 0; i < block.positions.size(); ++i, ++number) {
+      ASSERT_EQ(block.positions[i].x(), static_cast<float>(number));
+      ASSERT_EQ(block.rgb[3 * i + 1], static_cast<uint8_t>(number >> 8));
+      ASSERT_EQ(block.fields[0].values[i], -static_cast<float>(number));
+    }
+  });
+  EXPECT_EQ(number, kPoints);
+  EXPECT_GT(blocks, 2);
+}
+
 TEST(ReadPly, EmptyCloudsAreClouds) {
   const TemporaryDirectory directory;
   PlyWriter(directory / "a.ply", 0, {"changed"}).commit();

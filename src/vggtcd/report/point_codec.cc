@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
@@ -43,6 +44,24 @@ Quantized quantize(const Eigen::Vector3f& x, const QuantizationBox& box) {
 
 bool is_changed_label(uint8_t label) { return label == 1 || label == 2 || label == 4; }
 
+// The points of these numbers, which ascend.
+ReportPoints chosen_points(const ReportCloud& cloud, std::span<const uint32_t> chosen) {
+  ReportPoints points;
+  size_t first = 0, next = 0;
+  cloud.for_each_block([&](const ReportPoints& block) {
+    const size_t end = first + block.positions.size();
+    for (; next < chosen.size() && chosen[next] < end; ++next) {
+      const size_t i = chosen[next] - first;
+      points.positions.push_back(block.positions[i]);
+      points.color.insert(points.color.end(), &block.color[3 * i], &block.color[3 * i] + 3);
+      points.change_distance.push_back(block.change_distance[i]);
+      if (cloud.has_labels) points.label.push_back(block.label[i]);
+    }
+    first = end;
+  });
+  return points;
+}
+
 std::string plane_bytes(size_t size, const std::function<uint8_t(size_t)>& value) {
   std::string bytes(size, '\0');
   for (size_t i = 0; i < size; ++i) bytes[i] = static_cast<char>(value(i));
@@ -51,13 +70,34 @@ std::string plane_bytes(size_t size, const std::function<uint8_t(size_t)>& value
 
 }  // namespace
 
-QuantizationBox quantization_box(std::span<const Eigen::Vector3f> positions) {
+ReportCloud cloud_of(ReportPoints points) {
+  ReportCloud cloud;
+  cloud.size = points.positions.size();
+  cloud.has_labels = !points.label.empty();
+  check(points.color.size() == 3 * cloud.size && points.change_distance.size() == cloud.size,
+        "cloud_of: a color and a distance for every point");
+  check(points.label.empty() || points.label.size() == cloud.size,
+        "cloud_of: a label for every point or none");
+  const auto shared = std::make_shared<const ReportPoints>(std::move(points));
+  cloud.for_each_block = [shared](const auto& sink) { sink(*shared); };
+  return cloud;
+}
+
+QuantizationBox quantization_box(const ReportCloud& cloud) {
   constexpr size_t kSample = 100000;
   std::vector<Eigen::Vector3f> sample;
-  const size_t stride = std::max<size_t>(1, positions.size() / kSample);
-  for (size_t i = 0; i < positions.size(); i += stride) {
-    if (positions[i].allFinite()) sample.push_back(positions[i]);
-  }
+  const size_t stride = std::max<size_t>(1, cloud.size / kSample);
+  Eigen::Vector3f min = Eigen::Vector3f::Constant(INFINITY), max = -min;
+  size_t number = 0;
+  cloud.for_each_block([&](const ReportPoints& block) {
+    for (const Eigen::Vector3f& x : block.positions) {
+      const bool sampled = number++ % stride == 0;
+      if (!x.allFinite()) continue;
+      if (sampled) sample.push_back(x);
+      min = min.cwiseMin(x);
+      max = max.cwiseMax(x);
+    }
+  });
   QuantizationBox box;
   if (sample.empty()) return box;
   const std::array<double, 2> percents = {0.1, 99.9};
@@ -65,12 +105,6 @@ QuantizationBox quantization_box(std::span<const Eigen::Vector3f> positions) {
   const Eigen::Vector3f low = spread.col(0).cast<float>(), high = spread.col(1).cast<float>();
   const float size = std::max((high - low).maxCoeff(), 1e-6f);
   const Eigen::Vector3f margin = Eigen::Vector3f::Constant(size);
-  Eigen::Vector3f min = Eigen::Vector3f::Constant(INFINITY), max = -min;
-  for (const Eigen::Vector3f& x : positions) {
-    if (!x.allFinite()) continue;
-    min = min.cwiseMin(x);
-    max = max.cwiseMax(x);
-  }
   min = min.cwiseMax(low - margin).cwiseMin(low);
   max = max.cwiseMin(high + margin).cwiseMax(high);
   box.min = min;
@@ -80,18 +114,21 @@ QuantizationBox quantization_box(std::span<const Eigen::Vector3f> positions) {
 
 Candidates find_candidates(const ReportCloud& cloud, const LevelScale& scale) {
   Candidates found;
-  found.box = quantization_box(cloud.positions);
-  for (size_t i = 0; i < cloud.positions.size(); ++i) {
-    const bool changed = cloud.label.empty()
-                             ? cloud.change_distance[i] > scale.edge(scale.threshold_level())
-                             : is_changed_label(cloud.label[i]);
-    found.all_changed += changed;
-    if (!cloud.positions[i].allFinite() || !found.box.contains(cloud.positions[i])) {
-      ++found.far_away;
-    } else {
-      (changed ? found.changed : found.unchanged).push_back(static_cast<uint32_t>(i));
+  found.box = quantization_box(cloud);
+  const float threshold = scale.edge(scale.threshold_level());
+  uint32_t number = 0;
+  cloud.for_each_block([&](const ReportPoints& block) {
+    for (size_t i = 0; i < block.positions.size(); ++i, ++number) {
+      const bool changed = cloud.has_labels ? is_changed_label(block.label[i])
+                                            : block.change_distance[i] > threshold;
+      found.all_changed += changed;
+      if (!block.positions[i].allFinite() || !found.box.contains(block.positions[i])) {
+        ++found.far_away;
+      } else {
+        (changed ? found.changed : found.unchanged).push_back(number);
+      }
     }
-  }
+  });
   return found;
 }
 
@@ -127,14 +164,17 @@ Shares share_points(const Candidates& before, const Candidates& after, int64_t m
   return shares;
 }
 
-EncodedCloud encode_cloud(const ReportCloud& cloud, std::vector<uint32_t> chosen,
+EncodedCloud encode_cloud(const ReportCloud& all, std::vector<uint32_t> chosen,
                           const QuantizationBox& box, const LevelScale& scale) {
   const size_t n = chosen.size();
+  std::ranges::sort(chosen);
+  const ReportPoints cloud = chosen_points(all, chosen);
   std::vector<std::pair<uint64_t, uint32_t>> order(n);
   parallel_for(static_cast<int64_t>(n), kGrain, [&](int64_t begin, int64_t end) {
     for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      const Quantized q = quantize(cloud.positions[chosen[i]], box);
-      order[i] = {spread_bits(q[0]) | spread_bits(q[1]) << 1 | spread_bits(q[2]) << 2, chosen[i]};
+      const Quantized q = quantize(cloud.positions[i], box);
+      order[i] = {spread_bits(q[0]) | spread_bits(q[1]) << 1 | spread_bits(q[2]) << 2,
+                  static_cast<uint32_t>(i)};
     }
   });
   std::sort(order.begin(), order.end());

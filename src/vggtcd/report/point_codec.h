@@ -23,7 +23,7 @@ struct QuantizationBox {
     return (x.array() >= min.array()).all() && (x.array() <= (min + size).array()).all();
   }
 };
-QuantizationBox quantization_box(std::span<const Eigen::Vector3f> positions);
+QuantizationBox quantization_box(const ReportCloud& cloud);
 
 // The points of a cloud that could be shown, split by what decides who goes first.
 struct Candidates {

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/colmap.h"
@@ -35,25 +36,36 @@ std::string input_name(const Json& summary, const char* epoch) {
 }
 
 ReportCloud read_cloud(const fs::path& path) {
-  PlyCloud ply = read_ply(path);
-  ReportCloud cloud;
-  const std::vector<float>* distance = ply.field("change_distance");
-  if (!distance) {
+  const auto ply = std::make_shared<const PlyReader>(path);
+  const auto has = [&](const char* name) {
+    return std::ranges::find(ply->fields(), name) != ply->fields().end();
+  };
+  if (!has("change_distance")) {
     throw_error(ErrorCode::kInput,
                 "{}: expected a scalar field change_distance, found none; is this a "
                 "result of vggt-cd detect?",
                 path.string());
   }
-  cloud.change_distance = *distance;
-  if (const std::vector<float>* label = ply.field("label")) {
-    cloud.label.reserve(label->size());
-    for (const float value : *label) {
-      cloud.label.push_back(value >= 0 && value <= 4 ? static_cast<uint8_t>(value) : uint8_t{3});
-    }
-  }
-  cloud.positions = std::move(ply.positions);
-  cloud.color = std::move(ply.rgb);
-  if (cloud.color.empty()) cloud.color.assign(3 * cloud.positions.size(), 128);
+  ReportCloud cloud;
+  cloud.size = ply->size();
+  cloud.has_labels = has("label");
+  std::vector<std::string> fields = {"change_distance"};
+  if (cloud.has_labels) fields.push_back("label");
+  cloud.for_each_block = [ply, fields](const auto& sink) {
+    ReportPoints points;
+    ply->read(fields, [&](const PlyCloud& block) {
+      points.positions = block.positions;
+      points.color = block.rgb;
+      if (points.color.empty()) points.color.assign(3 * points.positions.size(), 128);
+      points.change_distance = block.fields[0].values;
+      points.label.clear();
+      for (size_t i = 0; fields.size() > 1 && i < points.positions.size(); ++i) {
+        const float value = block.fields[1].values[i];
+        points.label.push_back(value >= 0 && value <= 4 ? static_cast<uint8_t>(value) : uint8_t{3});
+      }
+      sink(points);
+    });
+  };
   return cloud;
 }
 

@@ -72,9 +72,17 @@ TEST(ReadResults, JoinsCamerasScoresAndPointsInFrameOrder) {
   EXPECT_EQ(input.after.photos[2].pinhole->cx, 3.5);
   EXPECT_TRUE(std::isnan(input.before.score[5]));
   EXPECT_EQ(input.after.score.size(), 144u);
-  EXPECT_EQ(input.before.cloud.positions[1], Eigen::Vector3f(1, 2, 3));
-  EXPECT_EQ(input.before.cloud.color[5], 31);
-  EXPECT_EQ(input.after.cloud.change_distance[1], 0.02f);
+  int blocks = 0;
+  input.before.cloud.for_each_block([&](const ReportPoints& points) {
+    ++blocks;
+    EXPECT_EQ(points.positions[1], Eigen::Vector3f(1, 2, 3));
+    EXPECT_EQ(points.color[5], 31);
+  });
+  input.after.cloud.for_each_block([&](const ReportPoints& points) {
+    ++blocks;
+    EXPECT_EQ(points.change_distance[1], 0.02f);
+  });
+  EXPECT_EQ(blocks, 2);
 }
 
 TEST(ReadResults, PhotosAreTheLeftPartsOfTheOverlays) {

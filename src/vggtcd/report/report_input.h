@@ -16,13 +16,24 @@
 
 namespace vggtcd {
 
-// The points of one epoch in the T2 frame; arrays of one length.
-struct ReportCloud {
+// Points in the T2 frame; arrays of one length.
+struct ReportPoints {
   std::vector<Eigen::Vector3f> positions;
   std::vector<uint8_t> color;          // [N, 3] RGB
   std::vector<float> change_distance;  // T2 units
   std::vector<uint8_t> label;  // [N], or empty: 0 unchanged 1 removed 2 added 3 unobserved 4 moved
 };
+
+// The points of one epoch. They are walked through a few times, in blocks, and never all in memory:
+// a full-size epoch has 17 million, of which the page shows fewer than one.
+struct ReportCloud {
+  size_t size = 0;
+  bool has_labels = false;
+  // Calls the sink with one block after the other; the same points in the same order every time.
+  std::function<void(const std::function<void(const ReportPoints& block)>& sink)> for_each_block;
+};
+// A cloud that is in memory already.
+ReportCloud cloud_of(ReportPoints points);
 
 struct ReportPhoto {
   std::string name;                         // as the user knows it; any bytes

@@ -35,11 +35,7 @@ class Blocks {
 void check_input(const ReportInput& input) {
   check(input.threshold_u > 0 && input.extent_u > 0, "write_report: positive threshold and extent");
   for (const ReportEpoch* epoch : {&input.before, &input.after}) {
-    const size_t n = epoch->cloud.positions.size();
-    check(epoch->cloud.color.size() == 3 * n && epoch->cloud.change_distance.size() == n,
-          "write_report: a color and a distance for every point");
-    check(epoch->cloud.label.empty() || epoch->cloud.label.size() == n,
-          "write_report: a label for every point or none");
+    check(epoch->cloud.for_each_block != nullptr, "write_report: a cloud, if an empty one");
     const size_t pixels = epoch->photos.size() * static_cast<size_t>(epoch->width) *
                           static_cast<size_t>(epoch->height);
     check(epoch->score.empty() || epoch->score.size() == pixels,
@@ -126,7 +122,7 @@ Json cloud_json(const ReportCloud& cloud, const Candidates& candidates, const En
                 int64_t changed_shown, bool after, Blocks& blocks) {
   const auto& [min, size] = candidates.box;
   Json json = {{"epoch", epoch_name(after)},
-               {"points", cloud.positions.size()},
+               {"points", cloud.size},
                {"shown", encoded.points},
                {"changed", candidates.all_changed},
                {"changed_shown", changed_shown},
@@ -136,7 +132,7 @@ Json cloud_json(const ReportCloud& cloud, const Candidates& candidates, const En
                {"position", blocks.add(encoded.position)},
                {"color", blocks.add(encoded.color)},
                {"level", blocks.add(encoded.level)}};
-  if (!cloud.label.empty()) json["label"] = blocks.add(encoded.label);
+  if (cloud.has_labels) json["label"] = blocks.add(encoded.label);
   return json;
 }
 
@@ -289,8 +285,7 @@ ReportData make_report_data(const ReportInput& input, const ReportOptions& optio
   ReportData data;
   data.json = join(escaped_dump(header), blocks);
   data.size = {static_cast<int64_t>(data.json.size()),
-               static_cast<int64_t>(input.before.cloud.positions.size() +
-                                    input.after.cloud.positions.size()),
+               static_cast<int64_t>(input.before.cloud.size + input.after.cloud.size),
                clouds.before.points + clouds.after.points};
   return data;
 }

@@ -97,12 +97,13 @@ ReportInput example(size_t points_per_epoch, int photos = 2) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
   for (ReportEpoch* epoch : {&input.before, &input.after}) {
+    ReportPoints points;
     for (size_t i = 0; i < points_per_epoch; ++i) {
-      epoch->cloud.positions.emplace_back(4 * unit(random), 3 * unit(random), 0.1f * unit(random));
-      for (int c = 0; c < 3; ++c)
-        epoch->cloud.color.push_back(static_cast<uint8_t>(255 * unit(random)));
-      epoch->cloud.change_distance.push_back(i % 50 == 0 ? 0.06f : 0.03f * unit(random));
+      points.positions.emplace_back(4 * unit(random), 3 * unit(random), 0.1f * unit(random));
+      for (int c = 0; c < 3; ++c) points.color.push_back(static_cast<uint8_t>(255 * unit(random)));
+      points.change_distance.push_back(i % 50 == 0 ? 0.06f : 0.03f * unit(random));
     }
+    epoch->cloud = cloud_of(std::move(points));
     epoch->width = 40;
     epoch->height = 30;
     for (int i = 0; i < photos; ++i) {
@@ -126,6 +127,12 @@ ReportInput example(size_t points_per_epoch, int photos = 2) {
   return input;
 }
 
+ReportPoints all_points(const ReportCloud& cloud) {
+  ReportPoints all;
+  cloud.for_each_block([&](const ReportPoints& block) { all = block; });
+  return all;
+}
+
 Json data_for(const ReportInput& input, const ReportOptions& options = {}) {
   return Json::parse(make_report_data(input, options).json);
 }
@@ -135,8 +142,8 @@ TEST(ReportData, PointsComeBackWithinHalfAStep) {
   const Json data = data_for(input);
   const LevelScale scale(input.threshold_u, input.bound_u);
   for (const Json& cloud : data.at("clouds")) {
-    const ReportCloud& truth =
-        cloud.at("epoch") == "before" ? input.before.cloud : input.after.cloud;
+    const ReportPoints truth =
+        all_points(cloud.at("epoch") == "before" ? input.before.cloud : input.after.cloud);
     const auto points = decode(data, cloud);
     ASSERT_EQ(points.size(), truth.positions.size());
     std::set<size_t> met;
@@ -192,9 +199,11 @@ TEST(ReportData, MoreChangedPointsThanRoomLeavesNoneOfTheOthers) {
 
 TEST(ReportData, StrayPointsDoNotCoarsenTheRest) {
   ReportInput input = example(20000);
-  input.before.cloud.positions[7] = {1e7f, 0, 0};
-  input.before.cloud.positions[8] = {NAN, 0, 0};
-  input.before.cloud.positions[9] = {0, -INFINITY, 0};
+  ReportPoints points = all_points(input.before.cloud);
+  points.positions[7] = {1e7f, 0, 0};
+  points.positions[8] = {NAN, 0, 0};
+  points.positions[9] = {0, -INFINITY, 0};
+  input.before.cloud = cloud_of(std::move(points));
   const Json data = data_for(input);
   const Json& cloud = data.at("clouds")[0];
   EXPECT_EQ(cloud.at("far_away"), 3);
