@@ -237,7 +237,40 @@ class Detect(unittest.TestCase):
         self.expect_failure(2, ["--joint", "--aligned"], "detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz")
 
     def test_out_of_range_option(self):
-        self.expect_failure(2, ["static_factor"], *self.arguments, "--static-factor", "-1")
+        self.expect_failure(2, ["--static-factor: expected"], *self.arguments, "--static-factor", "-1")
+
+    # --- alignments that nobody would want the changes of ---
+
+    def joint_with(self, name, **changed):
+        arrays = dict(np.load(EXAMPLE / "joint.npz"))
+        arrays.update(changed)
+        np.savez(self.root / name, **arrays)
+        return self.root / name
+
+    def sim3_with(self, name, **changed):
+        sim3 = json.loads((self.out / "sim3.json").read_text())
+        sim3.update({key: change(sim3[key]) for key, change in changed.items()})
+        (self.root / name).write_text(json.dumps(sim3))
+        return self.root / name
+
+    def test_reversed_keyframes_are_refused(self):
+        joint = np.load(EXAMPLE / "joint.npz")
+        path = self.joint_with("reversed.npz", keyframes_t1=joint["keyframes_t1"][::-1])
+        self.expect_failure(9, ["before epoch", "--accept-alignment"], "detect", EXAMPLE / "t1.npz",
+                            EXAMPLE / "t2.npz", "--joint", path)
+
+    def test_a_wrong_similarity_is_refused_unless_accepted(self):
+        path = self.sim3_with("thrice.json", scale=lambda scale: 3 * scale)
+        arguments = ("register", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--initial-sim3", path)
+        self.expect_failure(9, ["--accept-alignment"], *arguments)
+        out = self.root / "accepted"
+        done = run(*arguments, "--accept-alignment", "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        verdict = json.loads((out / "summary.json").read_text())["alignment"]["plausibility"]
+        self.assertIn(verdict["verdict"], ("surfaces_disagree", "no_overlap"))
+
+    def test_frames_that_are_not_common_are_refused(self):
+        self.expect_failure(9, ["--joint"], "detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--aligned")
 
     def test_unwritable_output(self):
         done = run(*self.arguments, "-o", "/proc/nowhere/out")
@@ -286,7 +319,9 @@ class Help(unittest.TestCase):
         self.assertRegex(run("--version").stdout, r"^vggt-cd \d+\.\d+\.\d+")
 
     def test_unknown_command_is_a_usage_error(self):
-        self.assertEqual(run("dettect").returncode, 2)
+        done = run("dettect")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("found dettect", done.stderr)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,12 @@
 
 #include "vggtcd/change/explain_pixel.h"
 #include "vggtcd/change/inquiry.h"
-#include "vggtcd/change/view_overlap.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
+#include "vggtcd/scene/view_overlap.h"
 
 namespace vggtcd {
 namespace {

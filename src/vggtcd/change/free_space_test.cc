@@ -9,10 +9,10 @@
 
 #include "tests/support/toy_scene.h"
 #include "vggtcd/change/pair_alignment.h"
-#include "vggtcd/change/view_overlap.h"
 #include "vggtcd/change/witness.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/scene/point_cloud.h"
+#include "vggtcd/scene/view_overlap.h"
 
 namespace vggtcd {
 namespace {

@@ -104,7 +104,8 @@ void add_benchmark(Program& program) {
       ->check(CLI::IsMember({"synthetic", "wat"}))
       ->capture_default_str();
   command
-      ->add_option("-o,--out", arguments->out, "directory for the report and for finished scenes")
+      ->add_option("-o,--out,--output", arguments->out,
+                   "directory for the report and for finished scenes")
       ->capture_default_str();
   add_fields(command, arguments->options, "Suite");
   command->add_option("--data", arguments->data, "directory with SCENE/images and SCENE/sparse/0")

@@ -51,6 +51,7 @@ void add_detect(Program& program) {
       }
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
+    print_plausibility(outcome.alignment);
     fmt::print("{}\n", outcome.alignment.explanation);
     fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
                percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,

@@ -2,6 +2,8 @@
 // The arguments that detect and register share: two epochs and what brings them together.
 #include "vggtcd/cli/epoch_arguments.h"
 
+#include <fmt/format.h>
+
 namespace vggtcd::cli {
 
 void EpochArguments::add_to(CLI::App* command) {
@@ -10,7 +12,8 @@ void EpochArguments::add_to(CLI::App* command) {
                    "The before epoch, T1: predictions (.npz); for detect also photos.")
       ->required();
   command->add_option("AFTER", after, "The after epoch, T2.")->required();
-  command->add_option("-o,--out", out, "Directory for the results; it appears when complete.")
+  command
+      ->add_option("-o,--out,--output", out, "Directory for the results; it appears when complete.")
       ->type_name("DIRECTORY")
       ->required();
   command
@@ -26,6 +29,12 @@ void EpochArguments::add_to(CLI::App* command) {
       ->group("How the epochs come together (predictions: exactly one)");
   command->add_flag("--aligned", aligned, "Both epochs are in one frame and scale already.")
       ->group("How the epochs come together (predictions: exactly one)");
+}
+
+void print_plausibility(const Alignment& alignment) {
+  const PlausibilityResult& plausibility = alignment.plausibility;
+  if (plausibility.verdict == Plausibility::kBelievable) return;
+  fmt::print("Careful: {}.\n", plausibility.explanation);
 }
 
 void EpochArguments::require_none() const {

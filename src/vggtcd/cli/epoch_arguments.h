@@ -21,4 +21,7 @@ struct EpochArguments {
   void require_none() const;
 };
 
+// A line for the terminal where something speaks against the alignment as a whole.
+void print_plausibility(const Alignment& alignment);
+
 }  // namespace vggtcd::cli

@@ -183,7 +183,7 @@ void add_evaluate(Program& program) {
   command->add_option("--poses", arguments->poses, "what the matrices of .npy files map")
       ->check(CLI::IsMember({"camera_from_world", "world_from_camera"}))
       ->capture_default_str();
-  command->add_option("-o,--out", arguments->out, "also write the numbers as JSON");
+  command->add_option("-o,--out,--output", arguments->out, "also write the numbers as JSON");
   command->footer(
       "Cameras are read from .npy ((N,4,4) or (N,3,4)), COLMAP models (folder) and TUM files.\n"
       "Frames are matched in order. T1 is mapped into T2, one Umeyama Sim(3) over all camera "

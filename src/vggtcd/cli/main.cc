@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <new>
 
@@ -19,6 +20,14 @@ namespace {
 int fail(ErrorCode code, std::string_view what) {
   fmt::print(stderr, "vggt-cd: {}\n", what);
   return static_cast<int>(code);
+}
+
+// The library names options by their fields ("min_votes: expected ..."); users know the flag.
+std::string with_flag(const std::string& what, const CLI::App& command) {
+  const size_t colon = what.find(':');
+  if (colon == std::string::npos) return what;
+  const std::string flag = flag_of(what.substr(0, colon));
+  return command.get_option_no_throw(flag) != nullptr ? flag + what.substr(colon) : what;
 }
 
 int run(int argc, char** argv) {
@@ -38,6 +47,14 @@ int run(int argc, char** argv) {
   add_synthesize(program);
   add_benchmark(program);
   add_evaluate(program);
+  const auto is_command = [&](const std::string& name) {
+    return std::ranges::any_of(program.app.get_subcommands([](CLI::App*) { return true; }),
+                               [&](CLI::App* command) { return command->get_name() == name; });
+  };
+  if (argc > 1 && argv[1][0] != '-' && !is_command(argv[1])) {
+    return fail(ErrorCode::kUsage,
+                fmt::format("expected a command, found {} (try --help)", argv[1]));
+  }
   try {
     program.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -47,7 +64,12 @@ int run(int argc, char** argv) {
   if (program.common.threads > 0) set_num_threads(program.common.threads);
   install_interrupt_handler();
   const std::unique_ptr<ProgressSink> progress = make_progress(program.common.progress);
-  program.action(*progress);
+  try {
+    program.action(*progress);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::kUsage) throw;
+    return fail(error.code(), with_flag(error.what(), *program.app.get_subcommands().front()));
+  }
   return 0;
 }
 

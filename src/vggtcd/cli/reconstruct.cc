@@ -8,6 +8,7 @@
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/photo_source.h"
+#include "vggtcd/reconstruction/choose_reconstructor.h"
 #include "vggtcd/vggt/batch_file.h"
 #include "vggtcd/vggt/checkpoint.h"
 #include "vggtcd/vggt/memory_plan.h"
@@ -21,7 +22,8 @@ namespace fs = std::filesystem;
 
 struct Arguments {
   std::vector<fs::path> photos;
-  fs::path output, weights;
+  fs::path output;
+  std::string weights;
   PreprocessOptions preprocess;
   VggtOptions network;
 };
@@ -40,7 +42,8 @@ ImageBatch load_input(const Arguments& arguments, ProgressSink& progress) {
 void reconstruct(const Arguments& arguments, ProgressSink& progress) {
   // What can be known to fail fails now, not after the network has run for an hour.
   { const OutputFile probe(arguments.output); }
-  const VggtConfig config = read_checkpoint_config(arguments.weights);
+  const fs::path weights = require_weights(arguments.weights);
+  const VggtConfig config = read_checkpoint_config(weights);
   const Precision precision = resolve_precision(arguments.network.precision);
   const ImageBatch images = load_input(arguments, progress);
   const VggtRun run{.frames = images.frames,
@@ -55,7 +58,7 @@ void reconstruct(const Arguments& arguments, ProgressSink& progress) {
 
   const Vggt network = [&] {
     const ProgressStage stage(progress, "weights");
-    return Vggt::load(arguments.weights, arguments.network);
+    return Vggt::load(weights, arguments.network);
   }();
   const Prediction prediction = network.reconstruct(images, progress);
   {
@@ -79,12 +82,14 @@ void add_reconstruct(Program& program) {
                    "Folders, patterns, photos and videos, in order; or one .npz with images "
                    "(S,3,H,W) in [0,1].")
       ->required();
-  command->add_option("-o,--output", arguments->output, "The prediction file to write (.npz).")
+  command
+      ->add_option("-o,--out,--output", arguments->output, "The prediction file to write (.npz).")
       ->required();
   command
       ->add_option("--weights", arguments->weights,
-                   "VGGT's weights: .safetensors or .pt, as downloaded or converted.")
-      ->required();
+                   "VGGT's weights: .safetensors or .pt, as downloaded or converted. Otherwise "
+                   "VGGTCD_WEIGHTS, then ~/.local/share/vggt-cd/model.safetensors.")
+      ->type_name("FILE");
   add_fields(command, arguments->network, "Network");
   add_fields(command, arguments->preprocess, "Photos");
   command->footer(

@@ -23,6 +23,7 @@ void add_register(Program& program) {
         const Alignment alignment =
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);
+        print_plausibility(alignment);
         fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n", alignment.explanation,
                    arguments->epochs.out, alignment.t2_from_t1.scale);
       });

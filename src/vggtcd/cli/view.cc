@@ -37,7 +37,7 @@ void add_view(Program& program) {
       });
   command->add_option("results", arguments->results, "Directory that vggt-cd detect wrote")
       ->required();
-  command->add_option("-o,--output", arguments->page,
+  command->add_option("-o,--out,--output", arguments->page,
                       "The page to write; RESULTS/report.html if not given");
   add_fields(command, arguments->options, "Page");
   command->footer(

@@ -111,7 +111,8 @@ void add_convert(Program& program, CLI::App& parent) {
         fmt::print("{}\n", arguments->to);
       });
   command->add_option("FILE", arguments->from, "A .safetensors or .pt file.")->required();
-  command->add_option("-o,--output", arguments->to, "The .safetensors file to write.")->required();
+  command->add_option("-o,--out,--output", arguments->to, "The .safetensors file to write.")
+      ->required();
   add_fields(command, arguments->options, "Conversion");
   command->footer(
       "Example:\n"

@@ -21,6 +21,7 @@ enum class ErrorCode {
   kOutput = 6,        // a result that cannot be written
   kMemory = 7,        // would not fit
   kUnavailable = 8,   // an optional component or external program that is missing
+  kImplausible = 9,   // two epochs that do not fit together; --accept-alignment overrides
   kInterrupted = 130  // Ctrl-C
 };
 

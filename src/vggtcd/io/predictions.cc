@@ -184,7 +184,7 @@ constexpr float kLargestConfidence = 1e30f;
 
 // After this, depth is >= 0 and finite, and confidence can be ranked.
 void drop_invalid_pixels(const std::string& name, Reconstruction& result, ProgressSink& progress) {
-  size_t dropped = 0;
+  size_t bad_pixels = 0, bad_depth = 0, bad_confidence = 0;
   std::vector<std::string> empty_frames;
   for (int frame = 0; frame < result.num_frames(); ++frame) {
     const size_t begin = static_cast<size_t>(frame) * result.pixels_per_frame();
@@ -194,25 +194,28 @@ void drop_invalid_pixels(const std::string& name, Reconstruction& result, Progre
       float& confidence = result.confidence[i];
       // Half precision saves the best confidences as infinity; they stay the best.
       if (confidence > kLargestConfidence) confidence = kLargestConfidence;
+      const bool good_depth = depth >= 0 && std::isfinite(depth);
       const bool good_confidence = confidence >= -kLargestConfidence;
-      if (!(depth >= 0 && std::isfinite(depth) && good_confidence)) {
-        ++dropped;
-        depth = 0;
-        if (!good_confidence) confidence = 0;
-      }
+      bad_pixels += good_depth && good_confidence ? 0 : 1;
+      bad_depth += good_depth ? 0 : 1;
+      bad_confidence += good_confidence ? 0 : 1;
+      if (!good_depth || !good_confidence) depth = 0;
+      if (!good_confidence) confidence = 0;
       any |= depth > 0;
     }
     if (!any) empty_frames.push_back(result.views[static_cast<size_t>(frame)].name);
   }
   if (empty_frames.size() == result.views.size()) {
-    throw_error(ErrorCode::kInput,
-                "{}: depth: expected positive numbers, found none in any of {} frames", name,
+    const bool confidence = bad_confidence > bad_depth;
+    throw_error(ErrorCode::kInput, "{}: {}: expected {} numbers, found none in any of {} frames",
+                name, confidence ? "confidence" : "depth", confidence ? "finite" : "positive",
                 result.views.size());
   }
-  if (dropped > 0) {
+  if (bad_depth + bad_confidence > 0) {
     progress.notice(fmt::format(
-        "{}: {} of {} pixels have NaN, infinite or negative depth or confidence and are ignored",
-        name, dropped, result.num_pixels()));
+        "{}: {} of {} pixels are ignored: depth is NaN, infinite or negative in {}, confidence is "
+        "NaN in {}",
+        name, bad_pixels, result.num_pixels(), bad_depth, bad_confidence));
   }
   if (!empty_frames.empty()) {
     progress.notice(fmt::format("{}: frames without any valid depth are skipped: {}", name,

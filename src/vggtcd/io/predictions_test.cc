@@ -194,7 +194,9 @@ TEST(ReadReconstruction, InvalidDepthIsNoDepthWithOneNotice) {
   arrays["depth_conf"][5] = std::numeric_limits<float>::infinity();  // the best there is
   const Reconstruction r = f.read(arrays);
   EXPECT_EQ(without_depth(r), 5u);
-  EXPECT_THAT(f.progress.notices, ElementsAre(HasSubstr("t1.npz: 4 of 192 pixels have NaN")));
+  EXPECT_THAT(f.progress.notices,
+              ElementsAre(HasSubstr("t1.npz: 4 of 192 pixels are ignored: depth is NaN, infinite "
+                                    "or negative in 3, confidence is NaN in 1")));
   EXPECT_GT(r.depth[5], 0);
   EXPECT_EQ(*std::max_element(r.confidence.begin(), r.confidence.end()), r.confidence[5]);
   for (const float confidence : r.confidence) EXPECT_TRUE(std::isfinite(confidence));

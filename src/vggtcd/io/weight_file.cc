@@ -75,6 +75,10 @@ WeightFile parse_weight_file(std::span<const std::byte> bytes, const std::string
 }
 
 WeightFile open_weight_file(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) {
+    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file",
+                path.string());
+  }
   const auto mapped = std::make_shared<const MappedFile>(path);
   WeightFile file = parse_weight_file(mapped->bytes(), path.string());
   // Both the mapping and what the parser had to copy must live as long as the tensors.

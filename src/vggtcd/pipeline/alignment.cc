@@ -68,6 +68,18 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       result.candidates = std::move(choice.candidates);
     });
   }
+  log.run("plausibility", [&](ProgressStage&) {
+    result.plausibility =
+        judge_plausibility(surface_agreement(before, after, result.t2_from_t1), result.coarse);
+  });
+  const PlausibilityResult& plausibility = result.plausibility;
+  if (plausibility.refused() && !options.accept_alignment) {
+    throw_error(ErrorCode::kImplausible, "{}; {}; --accept-alignment goes on regardless",
+                plausibility.explanation, initial.remedy);
+  }
+  if (plausibility.verdict != Plausibility::kBelievable) {
+    log.progress().notice(plausibility.explanation);
+  }
   return result;
 }
 

@@ -13,6 +13,7 @@
 #include "vggtcd/registration/candidates.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
+#include "vggtcd/registration/plausibility.h"
 #include "vggtcd/registration/robust.h"
 #include "vggtcd/scene/reconstruction.h"
 
@@ -32,6 +33,7 @@ struct AlignmentOptions {
   CoarseOptions coarse;
   FineOptions fine;
   RobustOptions robust;
+  bool accept_alignment = false;  // go on where the epochs do not fit together
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("method", self.method,
@@ -46,6 +48,10 @@ struct AlignmentOptions {
     field("coarse", self.coarse, "");
     field("fine", self.fine, "");
     field("robust", self.robust, "");
+    field(
+        "accept_alignment", self.accept_alignment,
+        "Go on with an alignment that is refused: no overlap, surfaces that agree no more than by "
+        "chance, a joint pass of other photos.");
   };
   void validate() const;
 };
@@ -55,6 +61,7 @@ struct InitialAlignment {
   const JointReconstruction* joint = nullptr;  // the coarse stage estimates it, or:
   Sim3 t2_from_t1;                             // it is given
   std::string source;                          // "joint pass", "aligned epochs", or a file name
+  std::string remedy;                          // what to do if the epochs do not fit together
 };
 
 struct Alignment {
@@ -68,10 +75,12 @@ struct Alignment {
   std::string chosen;                          // "coarse", "fine", "robust" or "initial"
   std::string verdict;      // machine-readable: refined, kept_coarse_..., coarse, given
   std::string explanation;  // one sentence
+  PlausibilityResult plausibility;
 };
 
 // Runs the stages that the method asks for. Reconstructions are as read; with shared_intrinsics the
-// caller has applied share_intrinsics to all of them.
+// caller has applied share_intrinsics to all of them. Throws Error{kImplausible} for an alignment
+// that nobody would want the changes of, unless options.accept_alignment.
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log);
 

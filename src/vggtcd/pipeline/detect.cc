@@ -42,12 +42,24 @@ Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, S
     }
   });
   if (epochs.joint) {
-    epochs.initial = {&*epochs.joint, {}, "joint pass"};
+    epochs.initial = {&*epochs.joint,
+                      {},
+                      "joint pass",
+                      inputs.origin.empty()
+                          ? "is the joint file of these photos, T1's keyframes first, and are "
+                            "keyframes_t1 and keyframes_t2 their frame numbers in that order?"
+                          : "do both sets of photos show one place, and from places near enough to "
+                            "see the same surfaces?"};
   } else if (inputs.initial_sim3) {
     epochs.initial = {nullptr, read_sim3(*inputs.initial_sim3),
-                      inputs.initial_sim3->filename().string()};
+                      inputs.initial_sim3->filename().string(),
+                      "is it x_T2 = s R x_T1 + t of these two files, and not its inverse?"};
   } else {
-    epochs.initial = {nullptr, {}, "epochs already in one frame"};
+    epochs.initial = {nullptr,
+                      {},
+                      "epochs already in one frame",
+                      "--aligned expects two reconstructions in one frame and one scale; otherwise "
+                      "give --joint or --initial-sim3"};
   }
   return epochs;
 }

@@ -26,7 +26,8 @@ Json epoch_to_joint_json(const EpochToJoint& epoch) {
   return {{"joint_from_epoch", sim3_to_json(epoch.joint_from_epoch)},
           {"candidates", epoch.candidates},
           {"correspondences", epoch.correspondences},
-          {"rms_residual_u", epoch.rms_residual_u}};
+          {"rms_residual_u", epoch.rms_residual_u},
+          {"unexplained_share", epoch.unexplained_share}};
 }
 
 Json fine_json(const FineResult& fine) {
@@ -77,6 +78,17 @@ Json robust_json(const RobustResult& robust) {
   return json;
 }
 
+Json plausibility_json(const PlausibilityResult& plausibility) {
+  const SurfaceAgreement& surfaces = plausibility.surfaces;
+  return {{"verdict", enum_to_string(plausibility.verdict)},
+          {"explanation", plausibility.explanation},
+          {"seen_share_t1", surfaces.seen_share_t1},
+          {"seen_share_t2", surfaces.seen_share_t2},
+          {"agreeing_share", surfaces.agreeing},
+          {"by_chance_share", surfaces.by_chance},
+          {"above_chance", surfaces.above_chance()}};
+}
+
 Json epoch_change_json(const EpochChange& change) {
   return {{"points", change.points},
           {"changed", change.changed},
@@ -122,6 +134,7 @@ Json alignment_json(const Alignment& alignment) {
   }
   if (alignment.fine) json["fine"] = fine_json(*alignment.fine);
   if (alignment.robust) json["robust"] = robust_json(*alignment.robust);
+  json["plausibility"] = plausibility_json(alignment.plausibility);
   for (const AlignmentCandidate& candidate : alignment.candidates) {
     json["candidates"].push_back({{"name", candidate.name}, {"surface_cost", candidate.cost}});
   }

@@ -10,6 +10,7 @@
 namespace vggtcd {
 namespace {
 
+// Empty: none.
 std::string found_weights(const std::string& given) {
   if (!given.empty()) return given;
   if (const char* named = std::getenv("VGGTCD_WEIGHTS"); named && *named) return named;
@@ -35,6 +36,20 @@ void ReconstructorOptions::validate() const {
               frame_side, "a multiple of 14 from 56 to 1036");
 }
 
+std::filesystem::path require_weights(const std::string& given) {
+  const std::string weights = found_weights(given);
+  if (weights.empty()) {
+    throw_error(ErrorCode::kWeights,
+                "no network weights: expected --weights FILE, VGGTCD_WEIGHTS or "
+                "~/.local/share/vggt-cd/model.safetensors; detect also works without "
+                "(--reconstructor classical)");
+  }
+  if (!std::filesystem::is_regular_file(weights)) {
+    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file", weights);
+  }
+  return weights;
+}
+
 std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,
                                                     ProgressSink& progress) {
   options.validate();
@@ -53,16 +68,8 @@ std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& 
     classical.frame_side_px = options.frame_side;
     return std::make_unique<ClassicalReconstructor>(classical);
   }
-  if (weights.empty()) {
-    throw_error(ErrorCode::kWeights,
-                "no network weights: expected --weights FILE, VGGTCD_WEIGHTS or "
-                "~/.local/share/vggt-cd/model.safetensors; or use --reconstructor classical");
-  }
-  if (!std::filesystem::is_regular_file(weights)) {
-    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file", weights);
-  }
   VggtReconstructorOptions vggt;
-  vggt.weights = weights;
+  vggt.weights = require_weights(options.weights);
   vggt.keyframes = options.keyframes;
   vggt.frame_side_px = options.frame_side;
   vggt.network.precision = options.precision;

@@ -34,6 +34,10 @@ struct ReconstructorOptions {
   void validate() const;
 };
 
+// The weights file that is meant: `given`, else VGGTCD_WEIGHTS, else the usual place. Throws
+// Error{kWeights} if there is none or no such file.
+std::filesystem::path require_weights(const std::string& given);
+
 // Throws Error{kWeights} if vggt is asked for and no weights are given or found. In auto,
 // `progress` gets a notice when it is the fallback.
 std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,

@@ -54,6 +54,16 @@ std::vector<PixelPair> confident_pairs(const Reconstruction& epoch, const Recons
   return pairs;
 }
 
+// The mean squared distance from the mean.
+double variance(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& x : points) mean += x;
+  mean /= static_cast<double>(points.size());
+  double sum = 0;
+  for (const Eigen::Vector3d& x : points) sum += (x - mean).squaredNorm();
+  return sum / static_cast<double>(points.size());
+}
+
 }  // namespace
 
 void CoarseOptions::validate() const {
@@ -107,6 +117,7 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
   result.candidates = static_cast<int64_t>(candidates.size());
   result.correspondences = static_cast<int64_t>(pairs.size());
   result.rms_residual_u = fit.rms;
+  result.unexplained_share = fit.rms * fit.rms / variance(in_joint);
   for (Eigen::Vector3d& x : in_epoch) x = fit.y_from_x * x;
   // Pairs are in the order of the keyframes.
   for (size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {

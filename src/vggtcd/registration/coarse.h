@@ -30,6 +30,7 @@ struct EpochToJoint {
   int64_t candidates = 0;                  // pixel pairs above the confidence median
   int64_t correspondences = 0;             // of them used, at most M
   double rms_residual_u = 0;               // of the used pairs, in joint units
+  double unexplained_share = 0;            // rms_residual_u^2 / variance of the points in the joint
   std::vector<KeyframeWitness> keyframes;  // of the used pairs, in the joint frame
 };
 

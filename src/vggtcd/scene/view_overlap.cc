@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which photos of the other epoch look at what a photo shows.
-#include "vggtcd/change/view_overlap.h"
+#include "vggtcd/scene/view_overlap.h"
 
 #include <algorithm>
 #include <numeric>

@@ -58,8 +58,16 @@ const table = (object: JsonObject): HTMLElement => h('table', {}, h('tbody', {},
 const card = (title: string, ...content: (Node | null)[]): HTMLElement =>
   h('section', { class: 'card' }, h('h2', {}, title), ...content);
 
-// The alignment verdict in a sentence.
+// The alignment verdict in a sentence; before it, what speaks against the alignment as a whole.
 export function verdictSentence(report: Report): string {
+  const plausibility = find(report.summary, 'plausibility');
+  if (isObject(plausibility) && plausibility.verdict !== 'believable' && typeof plausibility.explanation === 'string') {
+    return `Careful: ${plausibility.explanation}. ${stageSentence(report)}`;
+  }
+  return stageSentence(report);
+}
+
+function stageSentence(report: Report): string {
   const sentence = find(report.summary, 'explanation', 'verdict_sentence', 'sentence');
   if (typeof sentence === 'string') return sentence;
   const verdict = find(report.summary, 'verdict');
