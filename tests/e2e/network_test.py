@@ -53,7 +53,7 @@ class Network(unittest.TestCase):
         assert done.returncode == 0, done.stderr
         for folder in ("before", "after"):
             (cls.scene / folder / "0003.jpg").unlink()
-        cls.options = ("--weights", cls.weights, "--keyframes", "2", "--frame-side", SIDE)
+        cls.options = ("--weights", cls.weights, "--keyframes", "2", "--frame-side", SIDE, "--accept-alignment")
         cls.out = cls.root / "out"
         cls.done = run("detect", cls.scene / "before", cls.scene / "after", "-o", cls.out, *cls.options,
                        "--progress", "json")
@@ -68,6 +68,13 @@ class Network(unittest.TestCase):
     def kept(self, out):
         (folder,) = (out / ".stages").glob("vggt-*")
         return folder
+
+    def test_epochs_that_do_not_fit_together_are_refused_with_a_question(self):
+        options = [option for option in self.options if option != "--accept-alignment"]
+        done = run("detect", self.scene / "before", self.scene / "after", "-o", self.out, *options)
+        self.assertEqual(done.returncode, 9, done.stderr)
+        self.assertIn("do both sets of photos show one place", done.stderr)
+        self.assertTrue((self.out / "report.html").exists())  # the results of before are still there
 
     def test_three_passes_and_all_results(self):
         self.assertEqual(self.done.returncode, 0, self.done.stderr)
