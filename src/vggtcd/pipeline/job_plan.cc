@@ -19,7 +19,7 @@ constexpr double kVotesUs = 0.66, kThingsUs = 0.02;
 constexpr double kWriteUs = 0.12, kOverlaysUs = 0.2, kPageUs = 0.3;
 constexpr double kEveryStageS = 0.02;
 
-constexpr double kBytesPerPixel = 20, kVotesBytesPerPixel = 28, kFixedBytes = 1e8;
+constexpr double kBytesPerPixel = 20, kVotesBytesPerPixel = 4, kFixedBytes = 1e8;
 
 }  // namespace
 
