@@ -8,6 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "vggtcd/change/depth_correction.h"
+
 namespace vggtcd {
 
 inline constexpr uint8_t kNoExtremes = 0xff;  // nothing in the window may testify
@@ -30,14 +32,19 @@ struct DepthWindows {
                                       // bits, that of the farthest in the high ones; kNoExtremes
   const WindowSteps* steps = nullptr;
   float scale = 1;  // multiplies depths
+  int width = 0;
+  PhotoCorrection correction{};
 
   // False where nothing in the window may testify.
-  bool read(size_t pixel, float& near, float& far) const {
+  bool read(int u, int v, float& near, float& far) const {
+    const size_t pixel =
+        static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
     const uint8_t places = extremes[pixel];
     if (places == kNoExtremes) return false;
     const float* center = depth + pixel;
-    near = scale * center[steps->to[places & 15]];
-    far = scale * center[steps->to[places >> 4]];
+    const float factor = scale * correction.nearest(u, v);  // one for the whole window
+    near = factor * center[steps->to[places & 15]];
+    far = factor * center[steps->to[places >> 4]];
     return true;
   }
 };

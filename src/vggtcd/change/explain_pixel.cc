@@ -20,8 +20,8 @@ std::vector<PhotoTestimony> testimonies(const Inquiry& inquiry, const PixelQuest
         const View& view = inquiry.witness().epoch->views[static_cast<size_t>(asked)];
         PhotoTestimony photo{other_epoch + view.name, -1, -1, said, 0};
         if (said.vote != Vote::kOutside) {
-          photo.x = static_cast<int>(said.pixel % static_cast<size_t>(view.pinhole.width));
-          photo.y = static_cast<int>(said.pixel / static_cast<size_t>(view.pinhole.width));
+          photo.x = said.column;
+          photo.y = said.row;
         }
         PointVotes votes;
         votes.cast(said, scale);
@@ -53,8 +53,7 @@ PixelExplanation explain_pixel(const Inquiry& inquiry, const PixelQuestion& ques
   why.gap_u = answers.gap[in_frame];
   why.level_of_detection_u = answers.level_of_detection[in_frame];
   if (!(judged.depth[pixel] > 0)) return why;
-  const Eigen::Vector3f x =
-      inquiry.rays(question.frame).point(question.x, question.y, judged.depth[pixel]);
+  const Eigen::Vector3f x = inquiry.point(question.frame, question.x, question.y);
   why.photos = testimonies(inquiry, question, x, scale);
   const Tally around = PhotoTallies(inquiry, question.frame, grid, scale)
                            .around(question.x, question.y, options.smooth_radius);

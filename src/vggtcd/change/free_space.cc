@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vggtcd/change/depth_consensus.h"
 #include "vggtcd/change/explain_pixel.h"
 #include "vggtcd/change/inquiry.h"
 #include "vggtcd/core/parallel.h"
@@ -91,12 +92,18 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   result.scene_extent_u = extent_of(after);
   const float min_confidence_t1 = confidence_percentile(before, 100 * options.min_confidence_rank);
   const float min_confidence_t2 = confidence_percentile(after, 100 * options.min_confidence_rank);
-  const Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1);
-  const Witness witness_t2 = make_witness(after, {}, min_confidence_t2);
+  Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1);
+  Witness witness_t2 = make_witness(after, {}, min_confidence_t2);
+  if (options.consensus) {
+    witness_t1.correction =
+        depth_consensus(witness_t1, t2_from_t1, min_confidence_t1, result.scene_extent_u, {});
+    witness_t2.correction =
+        depth_consensus(witness_t2, {}, min_confidence_t2, result.scene_extent_u, {});
+  }
   stage.advance(0.1);
-  Inquiry t1(before, t2_from_t1, witness_t2,
+  Inquiry t1(before, t2_from_t1, witness_t1.correction, witness_t2,
              overlapping_views(before, after, t2_from_t1, options.max_views), min_confidence_t1);
-  Inquiry t2(after, {}, witness_t1,
+  Inquiry t2(after, {}, witness_t2.correction, witness_t1,
              overlapping_views(after, before, t2_from_t1.inverse(), options.max_views),
              min_confidence_t2);
 

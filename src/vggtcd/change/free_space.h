@@ -44,10 +44,12 @@ struct PhotoAnswersSink {
 // evidence, and counts anew.
 void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes);
 
-// Each photo of an epoch asks the photos of the other one that overlap it most; each pair is
-// aligned once more (pair_alignment.h), which also gives its relative sigma. A point X at depth z
-// in the other photo, whose depths in the 3 x 3 pixels around its projection span [lo, hi], with t
-// = tolerance_sigmas * sigma * z:
+// First each photo's depths give up what the others of its epoch do not confirm
+// (depth_consensus.h). Each photo of an epoch asks the photos of the other one that overlap it
+// most; each pair is aligned once more (pair_alignment.h), which also gives its relative sigma. A
+// point X at depth z in the other photo, whose depths in the 3 x 3 pixels around its projection
+// span [lo, hi] (taken at half its width where the window shows one surface), with
+// t = tolerance_sigmas * sigma * z:
 //   lo - z > t: the photo looks through X, a vote for change with gap lo - z;
 //   z - hi > t: X is hidden behind something, no vote;
 //   otherwise the photo sees X's surface, a vote against.

@@ -10,13 +10,14 @@ struct FreeSpaceOptions {
   int max_views = 16;  // photos of the other epoch asked about a photo; >= 1
   double min_confidence_rank =
       0.1;                  // share of the least confident pixels that may not testify, [0, 1)
+  bool consensus = true;    // takes off what the other photos of an epoch do not confirm
   bool align_pairs = true;  // removes what is left of pose and scale errors, pair by pair
   double tolerance_sigmas = 4.0;   // a gap counts beyond this many sigmas of its pair; > 0
   double max_pair_sigma = 0.04;    // relative; pairs that agree less give no testimony; > 0
   double min_through_share = 0.6;  // of the votes that say "gone", to call it changed; (0, 1]
   double min_votes = 1.0;          // fused votes below this: unobserved; > 0
   int fusion_grid = 100;           // voxels along the extent in which votes are fused; >= 1
-  int smooth_radius = 3;  // in steps of 1/260 of the photo's width, votes of one surface; 0: off
+  int smooth_radius = 2;  // in steps of 1/260 of the photo's width, votes of one surface; 0: off
   bool fill = true;       // pixels that may not testify take the answer of the surface around them
   int median_radius_px = 1;  // of the label filter in the photo; 0 turns it off
 
@@ -26,6 +27,9 @@ struct FreeSpaceOptions {
           "first.");
     field("min_confidence_rank", self.min_confidence_rank,
           "Free space: this share of the least confident pixels gives no testimony.");
+    field("consensus", self.consensus,
+          "Free space: first take off the smooth part of each photo's depths that the other photos "
+          "of its epoch do not confirm.");
     field("align_pairs", self.align_pairs,
           "Free space: align each pair of photos once more on the surfaces that agree.");
     field("tolerance_sigmas", self.tolerance_sigmas,

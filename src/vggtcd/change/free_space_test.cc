@@ -188,7 +188,8 @@ class SinglePixels {
   explicit SinglePixels(const Reconstruction& r)
       : reconstruction_(r), center_(r.pixels_per_frame(), 4 | 4 << 4), steps_(r.width) {}
   DepthWindows of(int frame) const {
-    return {reconstruction_.frame_depth(frame).data(), center_.data(), &steps_, 1};
+    return {reconstruction_.frame_depth(frame).data(), center_.data(), &steps_, 1,
+            reconstruction_.width};
   }
 
  private:
@@ -217,7 +218,7 @@ TEST(Witness, KeepsTheNearestAndTheFarthestDepthAroundEachPixel) {
         }
       }
       float near = 0, far = 0;
-      const bool found = witness.windows(0).read(static_cast<size_t>(v * r.width + u), near, far);
+      const bool found = witness.windows(0).read(u, v, near, far);
       ASSERT_EQ(found, !window.empty()) << u << " " << v;
       without += found ? 0 : 1;
       if (!found) continue;

@@ -23,10 +23,12 @@ VoteScale vote_scale(double scene_extent_u, double tolerance_sigmas, double regi
           static_cast<float>(tolerance_sigmas), registration_sigma_u};
 }
 
-Inquiry::Inquiry(const Reconstruction& judged, const Sim3& t2_from_judged, const Witness& witness,
+Inquiry::Inquiry(const Reconstruction& judged, const Sim3& t2_from_judged,
+                 const DepthCorrection& correction, const Witness& witness,
                  std::vector<std::vector<int>> views, float min_confidence)
     : judged_(judged),
       t2_from_judged_(t2_from_judged),
+      correction_(correction),
       witness_(witness),
       views_(std::move(views)),
       min_confidence_(min_confidence),

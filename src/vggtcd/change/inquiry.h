@@ -15,22 +15,25 @@
 
 namespace vggtcd {
 
-inline constexpr double kMinGapSigma = 3e-3;  // of the depth: no network measures depth better
+inline constexpr double kMinGapSigma = 2e-3;  // of the depth: no network measures depth better
 
 // One direction of the change detection. Refers to the judged epoch and the witness.
 class Inquiry {
  public:
   // views[frame]: the photos of the witness that are asked about that photo of the judged epoch.
-  // min_confidence: what a pixel of the judged epoch must have to ask.
-  Inquiry(const Reconstruction& judged, const Sim3& t2_from_judged, const Witness& witness,
+  // min_confidence: what a pixel of the judged epoch must have to ask. correction: of its depths.
+  Inquiry(const Reconstruction& judged, const Sim3& t2_from_judged,
+          const DepthCorrection& correction, const Witness& witness,
           std::vector<std::vector<int>> views, float min_confidence);
 
   const Reconstruction& judged() const { return judged_; }
   const Witness& witness() const { return witness_; }
   const std::vector<int>& views(int frame) const { return views_[static_cast<size_t>(frame)]; }
   bool asks(size_t pixel) const { return testifies(judged_, pixel, min_confidence_); }
-  PixelRays rays(int frame) const {
-    return PixelRays(judged_.views[static_cast<size_t>(frame)], t2_from_judged_);
+
+  // The point of a pixel with depth, T2.
+  Eigen::Vector3f point(int frame, int u, int v) const {
+    return point(rays(frame), correction_.photo(static_cast<size_t>(frame)), frame, u, v);
   }
 
   // Appends relative gaps (window centre - z) / z of a sparse sample: how well unchanged surfaces
@@ -53,12 +56,13 @@ class Inquiry {
   template <typename Visit>
   void for_each_point(int frame, int stride, Visit&& visit) const {
     const PixelRays rays_of_frame = rays(frame);
+    const PhotoCorrection correction = correction_.photo(static_cast<size_t>(frame));
     const size_t first = static_cast<size_t>(frame) * judged_.pixels_per_frame();
     for (int v = 0; v < judged_.height; v += stride) {
       for (int u = 0; u < judged_.width; u += stride) {
         const size_t pixel = first + static_cast<size_t>(v) * static_cast<size_t>(judged_.width) +
                              static_cast<size_t>(u);
-        if (asks(pixel)) visit(pixel, rays_of_frame.point(u, v, judged_.depth[pixel]));
+        if (asks(pixel)) visit(pixel, point(rays_of_frame, correction, frame, u, v));
       }
     }
   }
@@ -75,8 +79,20 @@ class Inquiry {
   }
 
  private:
+  PixelRays rays(int frame) const {
+    return PixelRays(judged_.views[static_cast<size_t>(frame)], t2_from_judged_);
+  }
+  Eigen::Vector3f point(const PixelRays& rays_of_frame, const PhotoCorrection& correction,
+                        int frame, int u, int v) const {
+    const size_t in_frame =
+        static_cast<size_t>(v) * static_cast<size_t>(judged_.width) + static_cast<size_t>(u);
+    return rays_of_frame.point(u, v,
+                               judged_.frame_depth(frame)[in_frame] * correction.factor(u, v));
+  }
+
   const Reconstruction& judged_;
   Sim3 t2_from_judged_;
+  const DepthCorrection& correction_;
   const Witness& witness_;
   std::vector<std::vector<int>> views_;
   float min_confidence_;

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
@@ -18,6 +19,7 @@ constexpr double kMaxSlope = 5;            // a surface seen more obliquely coun
 constexpr double kJump = 0.05;             // relative step in depth that is an edge, not a slope
 constexpr int kColorBins = 5;              // per channel
 constexpr float kBrightest = 2.5f;         // times the mean; brighter falls into the last bin
+constexpr double kOtherSurface = 0.03;     // relative: depths closer than this are one surface
 constexpr size_t kColorStride = 97;        // every 97th pixel is looked at for the mean colour
 constexpr double kMinRelativeEdge = 1e-3;  // of the longest edge: no box is without thickness
 
@@ -117,6 +119,36 @@ std::vector<PosedView> posed_views(const Reconstruction& epoch, const Sim3& t2_f
                      t2_from_epoch.scale, epoch.frame_depth(frame)});
   }
   return views;
+}
+
+double share_seen_through(std::span<const SeenPoint> points, std::span<const PosedView> views) {
+  int through = 0, told = 0;
+  for (const SeenPoint& point : points) {
+    for (size_t k = 0; k < views.size(); ++k) {
+      if (k == point.view) continue;
+      const PosedView& view = views[k];
+      const Eigen::Vector3d x = view.camera_from_t2 * point.x_in_t2.cast<double>();
+      if (!(x.z() > 0)) continue;
+      const Eigen::Vector2d uv = view.pinhole.project(x);
+      const int width = view.pinhole.width;
+      const int u = static_cast<int>(std::lround(uv.x())),
+                v = static_cast<int>(std::lround(uv.y()));
+      if (u < 1 || v < 1 || u >= width - 1 || v >= view.pinhole.height - 1) continue;
+      double near = std::numeric_limits<double>::max(), far = 0;
+      for (int y = v - 1; y <= v + 1; ++y) {
+        for (int i = y * width + u - 1; i <= y * width + u + 1; ++i) {
+          const double depth =
+              view.depth_scale * static_cast<double>(view.depth[static_cast<size_t>(i)]);
+          near = std::min(near, depth);
+          far = std::max(far, depth);
+        }
+      }
+      if (x.z() - far > kOtherSurface * x.z()) continue;  // hidden
+      through += near - x.z() > kOtherSurface * x.z() ? 1 : 0;
+      ++told;
+    }
+  }
+  return told > 0 ? static_cast<double>(through) / told : 0;
 }
 
 ChangedSpace changed_space(const OrientedBox& box, std::span<const PosedView> own,

@@ -33,6 +33,18 @@ struct PosedView {
 };
 std::vector<PosedView> posed_views(const Reconstruction& epoch, const Sim3& t2_from_epoch);
 
+// A point, and the view that it was seen in.
+struct SeenPoint {
+  Eigen::Vector3f x_in_t2;
+  size_t view = 0;
+};
+
+// Of the other views that the points are not hidden from, the share that looks through them: sees
+// only depths more than 3 % beyond, in the 3 x 3 pixels around. Surface is seen by all of them; a
+// point that flies between an edge and what lies behind it, or a photo that went wrong, is
+// contradicted by its own epoch. 0 if no view can tell.
+double share_seen_through(std::span<const SeenPoint> points, std::span<const PosedView> views);
+
 // The space in which something is in one epoch and nothing in the other: cells of a regular grid
 // (about cells_across along the longest edge) before whose centre no view of `own` sees a surface
 // farther away than margin_u, and some view of `other` does. So it reaches from the surface that

@@ -16,6 +16,7 @@ constexpr size_t kBestPhotos = 3;
 constexpr size_t kCarvingPhotos =
     8;  // photos that look through the box, those that show most of it
 constexpr int kCellsAcross = 32;
+constexpr size_t kContradictionPoints = 300;  // of a thing that its own epoch is asked about
 
 struct Pixel {
   int frame, u, v;
@@ -56,6 +57,7 @@ class EpochRegions {
           photos_of(members).size() < static_cast<size_t>(options.min_photos)) {
         return;
       }
+      if (contradiction(members) > options.max_contradiction) return;
       InstancePart part = measure(members, mean);
       if (is_thing(part)) parts[static_cast<size_t>(i)] = std::move(part);
     });
@@ -102,6 +104,17 @@ class EpochRegions {
         members_[static_cast<size_t>(components_.component[i])].push_back(i);
       }
     }
+  }
+
+  // How far the photos of the own epoch see through a sample of the points.
+  double contradiction(const std::vector<uint32_t>& members) const {
+    const size_t step = std::max<size_t>(1, members.size() / kContradictionPoints);
+    std::vector<SeenPoint> sample;
+    for (size_t k = step / 2; k < members.size(); k += step) {
+      const uint32_t i = members[k];
+      sample.push_back({positions_[i], pixels_[i] / epoch_.pixels_per_frame()});
+    }
+    return share_seen_through(sample, views_);
   }
 
   InstancePart measure(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
@@ -269,6 +282,8 @@ void InstanceOptions::validate() const {
   check_field(min_size_fraction >= 0, "min_size_fraction", min_size_fraction, "at least 0");
   check_field(min_width_fraction >= 0, "min_width_fraction", min_width_fraction, "at least 0");
   check_field(min_photos >= 1, "min_photos", min_photos, "at least 1");
+  check_field(max_contradiction >= 0 && max_contradiction <= 1, "max_contradiction",
+              max_contradiction, "a number in [0, 1]");
   check_field(min_confidence >= 0 && min_confidence <= 1, "min_confidence", min_confidence,
               "a number in [0, 1]");
   check_field(min_instance_points >= 1, "min_instance_points", min_instance_points, "at least 1");

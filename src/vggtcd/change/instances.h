@@ -17,15 +17,16 @@
 namespace vggtcd {
 
 struct InstanceOptions {
-  double link_fraction = 0.01;        // voxel edge / scene extent; > 0
-  int min_voxel_points = 3;           // fewer points of one voxel connect nothing; >= 1
-  double min_size_fraction = 0.02;    // longest edge of the box / scene extent; >= 0
-  double min_width_fraction = 0.015;  // its second longest edge; slivers along edges are noise
-  int min_instance_points = 30;       // >= 1
-  int min_photos = 2;                 // of its epoch that show it; >= 1
-  double min_confidence = 0.8;        // mean over its pixels, where votes give one; [0, 1]
-  double move_shape_ratio = 0.6;      // of the box edges of a pair, smaller / larger; (0, 1]
-  double move_color_overlap = 0.6;    // common part of the colour histograms of a pair; (0, 1]
+  double link_fraction = 0.01;       // voxel edge / scene extent; > 0
+  int min_voxel_points = 3;          // fewer points of one voxel connect nothing; >= 1
+  double min_size_fraction = 0.02;   // longest edge of the box / scene extent; >= 0
+  double min_width_fraction = 0.01;  // its second longest edge; slivers along edges are noise
+  int min_instance_points = 30;      // >= 1
+  int min_photos = 3;                // of its epoch that show it; >= 1
+  double max_contradiction = 0.6;    // of its own epoch's photos, share that sees through it
+  double min_confidence = 0.85;      // mean over its pixels, where votes give one; [0, 1]
+  double move_shape_ratio = 0.6;     // of the box edges of a pair, smaller / larger; (0, 1]
+  double move_color_overlap = 0.6;   // common part of the colour histograms of a pair; (0, 1]
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("link_fraction", self.link_fraction,
@@ -41,6 +42,10 @@ struct InstanceOptions {
     field("min_instance_points", self.min_instance_points,
           "Instances: things with fewer points are left out.");
     field("min_photos", self.min_photos, "Instances: things in fewer photos are left out.");
+    field(
+        "max_contradiction", self.max_contradiction,
+        "Instances: things that more than this share of the photos of their own epoch see through "
+        "are left out.");
     field("min_confidence", self.min_confidence,
           "Instances: things of which the votes are less sure on average are left out.");
     field("move_shape_ratio", self.move_shape_ratio,

@@ -234,6 +234,21 @@ TEST(PrincipalBox, OfARotatedBoxOfPointsHasItsSizes) {
   EXPECT_NEAR(std::abs(box.rotation.col(0).dot(axes.col(1))), 1, 1e-3);
 }
 
+TEST(ShareSeenThrough, IsThatOfTheOtherViewsThePointIsNotHiddenFrom) {
+  const Plane near(0), far(0);  // both at z = 2
+  Plane nearer(0);
+  for (float& depth : nearer.depth) depth = 1.0f;
+  const PosedView plane[] = {near.view, far.view};
+  const PosedView mixed[] = {near.view, far.view, nearer.view};
+  const SeenPoint on{{0, 0, 2}, 0}, before{{0, 0, 1.5f}, 0}, just{{0, 0, 1.95f}, 0};
+  EXPECT_EQ(share_seen_through(std::vector{on}, plane), 0);
+  EXPECT_EQ(share_seen_through(std::vector{before}, plane), 1);
+  EXPECT_EQ(share_seen_through(std::vector{just}, plane), 0);  // within 3 %
+  EXPECT_EQ(share_seen_through(std::vector{before, on}, plane), 0.5);
+  EXPECT_EQ(share_seen_through(std::vector{before}, mixed), 1);  // hidden from the third
+  EXPECT_EQ(share_seen_through(std::vector{before}, std::span(plane).first(1)), 0);  // its own
+}
+
 TEST(ChangedSpace, IsWhatOneEpochSeesThroughAndTheOtherDoesNot) {
   Plane near(0), far(0);
   for (float& depth : near.depth) depth = 1.5f;

@@ -16,9 +16,11 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 constexpr int kMinSamples = 50;
 constexpr double kSmooth = 1.05;  // far / near of a window that shows one surface
 constexpr double kSigmaFromMad = 1.4826;
-constexpr double kMinGate = 0.01;  // relative; the gate never closes further
+constexpr double kMinSigma = 1e-3;  // relative; below it the prior holds what a plane leaves free
+constexpr double kMinGate = 0.01;   // relative; the gate never closes further
 
 struct Sample {
+  size_t point = 0;                    // index
   double gap = 0;                      // depth / z - 1
   Vector7 jacobian = Vector7::Zero();  // of gap by (w, t, s)
 };
@@ -31,10 +33,8 @@ bool smooth_depth(const WitnessPhoto& photo, double u, double v, double& depth,
   const int width = photo.pinhole.width, height = photo.pinhole.height;
   if (x < 1 || y < 1 || x >= width - 1 || y >= height - 1) return false;
   const auto mean = [&](int column, int row, double& value) {
-    const size_t i =
-        static_cast<size_t>(row) * static_cast<size_t>(width) + static_cast<size_t>(column);
     float near = 0, far = 0;
-    if (!photo.windows.read(i, near, far)) return false;
+    if (!photo.windows.read(column, row, near, far)) return false;
     value = 0.5 * (static_cast<double>(near) + static_cast<double>(far));
     return static_cast<double>(far) < kSmooth * static_cast<double>(near);
   };
@@ -52,14 +52,15 @@ std::vector<Sample> samples_of(std::span<const Eigen::Vector3f> points, const Wi
                                const PairAlignment& pair) {
   std::vector<Sample> samples;
   const Pinhole& k = photo.pinhole;
-  for (const Eigen::Vector3f& x : points) {
-    const Eigen::Vector3d p = pair.matrix * x.cast<double>() + pair.offset;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d p = pair.matrix * points[i].cast<double>() + pair.offset;
     if (!(p.z() > 0)) continue;
     const Eigen::Vector2d uv = k.project(p);
     double depth = 0;
     Eigen::Vector2d slope;
     if (!k.contains(uv.x(), uv.y()) || !smooth_depth(photo, uv.x(), uv.y(), depth, slope)) continue;
     Sample sample;
+    sample.point = i;
     sample.gap = depth / p.z() - 1;
     // d(depth - z) by p: the pixel moves along the slope, and z itself moves.
     const Eigen::Vector3d by_p(
@@ -107,7 +108,7 @@ PairAlignment align_pair(std::span<const Eigen::Vector3f> points, const WitnessP
     if (iteration == options.iterations) break;
     gate = std::clamp(4 * sigma, kMinGate, gate);
     // Neighbouring samples err alike: a few hundred count as a few dozen.
-    const double weight = 1.0 / (sigma * sigma * 10);
+    const double weight = 1.0 / (10 * std::max(sigma * sigma, kMinSigma * kMinSigma));
     Matrix7 normal = information.asDiagonal();
     Vector7 right = -information.cwiseProduct(total);
     for (const Sample& sample : samples) {
@@ -127,6 +128,18 @@ PairAlignment align_pair(std::span<const Eigen::Vector3f> points, const WitnessP
     pair.offset = small * pair.offset + step.segment<3>(3);
   }
   return pair;
+}
+
+std::vector<SurfaceGap> surface_gaps(std::span<const Eigen::Vector3f> points,
+                                     const Eigen::Vector3d& center, const WitnessPhoto& photo,
+                                     const PairAlignment& pair) {
+  std::vector<SurfaceGap> gaps;
+  for (const Sample& sample : samples_of(points, photo, pair)) {
+    const Eigen::Vector3d by_log_distance =
+        pair.matrix * (points[sample.point].cast<double>() - center);
+    gaps.push_back({sample.point, sample.gap, sample.jacobian.segment<3>(3).dot(by_log_distance)});
+  }
+  return gaps;
 }
 
 }  // namespace vggtcd

@@ -14,9 +14,9 @@
 namespace vggtcd {
 
 struct PairAlignmentOptions {
-  double prior_rotation_rad = 0.005;  // standard deviations of what there is to remove: rotation,
-  double prior_translation = 0.005;   // translation (share of the scene extent)
-  double prior_log_scale = 0.01;      // and scale
+  double prior_rotation_rad = 0.01;  // standard deviations of what there is to remove: rotation,
+  double prior_translation = 0.01;   // translation (share of the scene extent)
+  double prior_log_scale = 0.02;     // and scale
   int iterations = 4;
 };
 
@@ -41,5 +41,18 @@ struct PairAlignment {
 // are change, not error. With fewer than 50 samples nothing is corrected and gap_sigma is gate / 4.
 PairAlignment align_pair(std::span<const Eigen::Vector3f> points, const WitnessPhoto& photo,
                          double gate, double scene_extent_u, const PairAlignmentOptions& options);
+
+// How far a photo sees beyond a point of smooth surface.
+struct SurfaceGap {
+  size_t point = 0;  // index
+  double gap = 0;    // relative: depth / z - 1
+  double slope = 0;  // of the gap by the logarithm of the point's distance from where it was seen
+};
+
+// The gaps of those points that fall on smooth surface in the photo; center (T2): where the points
+// were seen from.
+std::vector<SurfaceGap> surface_gaps(std::span<const Eigen::Vector3f> points,
+                                     const Eigen::Vector3d& center, const WitnessPhoto& photo,
+                                     const PairAlignment& pair);
 
 }  // namespace vggtcd

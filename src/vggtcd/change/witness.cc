@@ -14,7 +14,8 @@ Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, flo
                   static_cast<float>(t2_from_epoch.scale),
                   WindowSteps(epoch.width),
                   {},
-                  std::vector<uint8_t>(epoch.num_pixels(), kNoExtremes)};
+                  std::vector<uint8_t>(epoch.num_pixels(), kNoExtremes),
+                  {}};
   for (const View& view : epoch.views) {
     witness.camera_from_t2.push_back(camera_from_new_world(view.camera_from_world, t2_from_epoch));
   }

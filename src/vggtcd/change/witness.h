@@ -23,10 +23,12 @@ struct Witness {
   WindowSteps steps;
   std::vector<Rigid3> camera_from_t2;  // depths in T2 units
   std::vector<uint8_t> extremes;       // [S, H, W]: of the DepthWindows
+  DepthCorrection correction{};        // of the epoch's depths
 
   DepthWindows windows(size_t frame) const {
     const size_t first = frame * epoch->pixels_per_frame();
-    return {epoch->depth.data() + first, extremes.data() + first, &steps, t2_scale};
+    return {epoch->depth.data() + first, extremes.data() + first, &steps, t2_scale, epoch->width,
+            correction.photo(frame)};
   }
 };
 
@@ -51,15 +53,16 @@ struct PairProjection {
         width(pinhole.width),
         height(pinhole.height) {}
 
-  // The pixel index within the frame and the depth; false if the point is outside the photo.
-  bool operator()(const Eigen::Vector3f& x, size_t& pixel, float& depth) const {
+  // The pixel and the depth; false if the point is outside the photo.
+  bool operator()(const Eigen::Vector3f& x, int& column, int& row, float& depth) const {
     const Eigen::Vector3f h = matrix * x + offset;
     depth = h.z();
     if (!(depth > 0)) return false;
     const float u = h.x() / depth + 0.5f, v = h.y() / depth + 0.5f;
     if (!(u >= 0 && v >= 0 && u < static_cast<float>(width) && v < static_cast<float>(height)))
       return false;
-    pixel = static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
+    column = static_cast<int>(u);
+    row = static_cast<int>(v);
     return true;
   }
 };
@@ -76,22 +79,31 @@ std::span<const EnumName<Vote>> enum_names(Vote);
 // One photo about one point. T2 units.
 struct Testimony {
   Vote vote = Vote::kOutside;
-  size_t pixel = 0;         // of the photo, where the point falls
+  int column = 0, row = 0;  // of the photo, where the point falls
   float z = 0;              // depth of the point there
   float near = 0, far = 0;  // of the 3 x 3 window; far 0: nothing there may testify
   float gap_u = 0;          // signed: how far the photo sees beyond the point
   float sigma_u = 0;        // of the gaps of this pair at this depth
 };
 
+// A window whose depths span less than this ratio shows one surface.
+inline constexpr float kOneSurface = 1.1f;
+
 // The rule, with t = tolerance_sigmas * sigma * z: near - z > t looks through, z - far > t hidden,
-// otherwise the surface is seen. x is in T2.
+// otherwise the surface is seen. A window of one surface is taken at half its width: the pixel
+// nearest to a point is half a pixel off at most, the window one and a half. x is in T2.
 inline Testimony ask(const PairProjection& pair, const DepthWindows& photo,
                      const Eigen::Vector3f& x, float tolerance_sigmas) {
   Testimony said;
-  if (!pair(x, said.pixel, said.z)) return said;
+  if (!pair(x, said.column, said.row, said.z)) return said;
   said.vote = Vote::kNoTestimony;
   said.sigma_u = pair.sigma * said.z;
-  if (!photo.read(said.pixel, said.near, said.far)) return said;
+  if (!photo.read(said.column, said.row, said.near, said.far)) return said;
+  if (said.far < kOneSurface * said.near) {
+    const float quarter = 0.25f * (said.far - said.near);
+    said.near += quarter;
+    said.far -= quarter;
+  }
   said.gap_u =
       said.z < said.near ? said.near - said.z : (said.z > said.far ? said.far - said.z : 0.0f);
   if (!(said.sigma_u > 0)) return said;
