@@ -56,10 +56,17 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
   if (options.method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
       std::optional<InitialUncertainty> uncertainty;
-      if (result.coarse) uncertainty = coarse_uncertainty(*result.coarse);
+      AlignmentCandidate start{result.chosen, result.initial_t2_from_t1, 0};
+      if (initial.joint && options.robust.relative_depth) {
+        const CoarseResult by_depth = align_coarse(before, after, *initial.joint, options.coarse,
+                                                   PairWeights::kInverseSquaredDepth);
+        start = {"coarse_by_depth", by_depth.t2_from_t1, 0};
+        uncertainty = coarse_uncertainty(by_depth);
+      } else if (result.coarse) {
+        uncertainty = coarse_uncertainty(*result.coarse);
+      }
       AlignmentChoice choice =
-          choose_alignment(before, after, {result.chosen, result.initial_t2_from_t1, 0},
-                           uncertainty, *result.fine, options.robust);
+          choose_alignment(before, after, start, uncertainty, *result.fine, options.robust);
       result.t2_from_t1 = choice.t2_from_t1;
       result.chosen = std::move(choice.chosen);
       result.verdict = std::move(choice.verdict);

@@ -72,7 +72,8 @@ void CoarseOptions::validate() const {
 
 EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruction& joint,
                                   const std::vector<int>& keyframes, int first_joint_frame,
-                                  const char* epoch_name, const CoarseOptions& options) {
+                                  const char* epoch_name, const CoarseOptions& options,
+                                  PairWeights pair_weights) {
   options.validate();
   if (epoch.width != joint.width || epoch.height != joint.height) {
     throw_error(
@@ -97,14 +98,18 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
                 epoch_name, keyframes.size(), pairs.size());
   }
   std::vector<Eigen::Vector3d> in_epoch, in_joint;
+  std::vector<double> weights;
   for (const PixelPair& pair : pairs) {
     in_epoch.push_back(unproject_pixel(epoch, pair.in_epoch).cast<double>());
     in_joint.push_back(unproject_pixel(joint, pair.in_joint).cast<double>());
+    const double depth_u = static_cast<double>(epoch.depth[pair.in_epoch]);
+    weights.push_back(pair_weights == PairWeights::kEqual ? 1 : 1 / (depth_u * depth_u));
   }
   // Points are float, so a line is 1e-7 of its length thick; paired with a relief that is as wide
   // as long this is the ratio of the singular values. No usable scene is anywhere near a thousandth
   // thick.
-  const UmeyamaResult fit = umeyama(in_epoch, in_joint, {}, {.min_singular_value_ratio = 1e-6});
+  const UmeyamaResult fit =
+      umeyama(in_epoch, in_joint, weights, {.min_singular_value_ratio = 1e-6});
   if (!fit.determined()) {
     throw_error(
         ErrorCode::kDegenerate,
@@ -123,8 +128,10 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
   for (size_t begin = 0, end = 0; begin < pairs.size(); begin = end) {
     const size_t frame = pairs[begin].in_joint / joint.pixels_per_frame();
     while (end < pairs.size() && pairs[end].in_joint / joint.pixels_per_frame() == frame) ++end;
-    result.keyframes.push_back(keyframe_witness(std::span(in_epoch).subspan(begin, end - begin),
-                                                std::span(in_joint).subspan(begin, end - begin)));
+    const size_t count = end - begin;
+    result.keyframes.push_back(keyframe_witness(std::span(in_epoch).subspan(begin, count),
+                                                std::span(in_joint).subspan(begin, count),
+                                                std::span(weights).subspan(begin, count)));
   }
   return result;
 }
@@ -143,12 +150,14 @@ InitialUncertainty coarse_uncertainty(const CoarseResult& coarse) {
 }
 
 CoarseResult align_coarse(const Reconstruction& before, const Reconstruction& after,
-                          const JointReconstruction& joint, const CoarseOptions& options) {
+                          const JointReconstruction& joint, const CoarseOptions& options,
+                          PairWeights weights) {
   CoarseResult result;
-  result.t1 =
-      align_epoch_to_joint(before, joint.reconstruction, joint.keyframes_t1, 0, "before", options);
-  result.t2 = align_epoch_to_joint(after, joint.reconstruction, joint.keyframes_t2,
-                                   static_cast<int>(joint.keyframes_t1.size()), "after", options);
+  result.t1 = align_epoch_to_joint(before, joint.reconstruction, joint.keyframes_t1, 0, "before",
+                                   options, weights);
+  result.t2 =
+      align_epoch_to_joint(after, joint.reconstruction, joint.keyframes_t2,
+                           static_cast<int>(joint.keyframes_t1.size()), "after", options, weights);
   result.t2_from_t1 = compose_through_joint(result.t1.joint_from_epoch, result.t2.joint_from_epoch);
   return result;
 }

@@ -24,6 +24,11 @@ struct CoarseOptions {
   void validate() const;
 };
 
+// What a pixel pair weighs. The paper: all the same. A depth errs in proportion to itself and a
+// camera's turn moves what it sees in proportion to its distance, so the variance of a point grows
+// with the square of its depth.
+enum class PairWeights { kEqual, kInverseSquaredDepth };
+
 // One epoch against the joint pass.
 struct EpochToJoint {
   Sim3 joint_from_epoch;
@@ -47,7 +52,8 @@ struct CoarseResult {
 // frame sizes differ.
 EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruction& joint,
                                   const std::vector<int>& keyframes, int first_joint_frame,
-                                  const char* epoch_name, const CoarseOptions& options);
+                                  const char* epoch_name, const CoarseOptions& options,
+                                  PairWeights weights = PairWeights::kEqual);
 
 // Eq. 3: s = s1 / s2, R = R2^T R1, t = R2^T (t1 - t2) / s2.
 Sim3 compose_through_joint(const Sim3& joint_from_t1, const Sim3& joint_from_t2);
@@ -57,6 +63,7 @@ InitialUncertainty coarse_uncertainty(const CoarseResult& coarse);
 
 // The whole stage: both epochs to the joint frame, composed.
 CoarseResult align_coarse(const Reconstruction& before, const Reconstruction& after,
-                          const JointReconstruction& joint, const CoarseOptions& options);
+                          const JointReconstruction& joint, const CoarseOptions& options,
+                          PairWeights weights = PairWeights::kEqual);
 
 }  // namespace vggtcd

@@ -22,16 +22,27 @@ constexpr double kPairShare = 0.5;        // found from both sides
 // Photos next to each other in the list err alike anyway; this bounds the linear system.
 constexpr int kMaxWitnesses = 48;
 
-double residual_sigma(const std::vector<SurfacePair>& pairs, double min_sigma_u) {
-  std::vector<float> residuals(pairs.size());
+double median_over(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
+  std::vector<float> values(pairs.size());
   constexpr int64_t kGrain = 1 << 14;
   parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
     for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      residuals[i] = static_cast<float>(std::abs(pairs[i].plane_residual()));
+      values[i] = static_cast<float>(value(pairs[i]));
     }
   });
-  if (residuals.empty()) return min_sigma_u;
-  return std::max(min_sigma_u, kSigmaFromMad * static_cast<double>(median(residuals)));
+  return values.empty() ? 0 : static_cast<double>(median(values));
+}
+
+double relative_sigma_of(const std::vector<SurfacePair>& pairs, double min_relative_sigma) {
+  const double mad = median_over(pairs, [](const SurfacePair& pair) {
+    return std::abs(pair.plane_residual()) / pair.depth_u;
+  });
+  return std::max(min_relative_sigma, kSigmaFromMad * mad);
+}
+
+int group_of(int32_t frame, int32_t frames) {
+  return frames <= kMaxWitnesses ? frame
+                                 : static_cast<int>(int64_t{frame} * kMaxWitnesses / frames);
 }
 
 // One side's photos, gathered into at most kMaxWitnesses groups of neighbours.
@@ -44,16 +55,17 @@ class Witnesses {
     std::vector<double> sizes(centers_.size(), 0);
     for (const SurfacePair& pair : pairs) {
       const size_t witness = static_cast<size_t>(of(pair.*frame));
-      centers_[witness] += pair.*point;
-      ++sizes[witness];
+      const double weight = 1 / (pair.depth_u * pair.depth_u);
+      centers_[witness] += weight * pair.*point;
+      sizes[witness] += weight;
     }
-    for (size_t k = 0; k < centers_.size(); ++k) centers_[k] /= std::max(1.0, sizes[k]);
+    for (size_t k = 0; k < centers_.size(); ++k) {
+      if (sizes[k] > 0) centers_[k] /= sizes[k];
+    }
   }
+  int frames() const { return frames_; }
   int count() const { return std::min(frames_, kMaxWitnesses); }
-  int of(int32_t frame) const {
-    return frames_ <= kMaxWitnesses ? frame
-                                    : static_cast<int>(int64_t{frame} * kMaxWitnesses / frames_);
-  }
+  int of(int32_t frame) const { return group_of(frame, frames_); }
   const Eigen::Vector3d& center(int witness) const {
     return centers_[static_cast<size_t>(witness)];
   }
@@ -74,7 +86,7 @@ struct Block {
 template <typename BlockOf>
 std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t num_blocks,
                                 const BlockOf& block_of, const Eigen::Vector3d& pivot,
-                                double sigma) {
+                                double relative_sigma) {
   // The pairs in the order of their blocks, by counting.
   std::vector<size_t> starts(num_blocks + 1, 0);
   for (const SurfacePair& pair : pairs) ++starts[block_of(pair) + 1];
@@ -87,6 +99,7 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
   std::vector<Block> blocks(num_blocks);
   const auto add = [&](const SurfacePair& pair, Block& block) {
     const double residual = pair.plane_residual();
+    const double sigma = relative_sigma * pair.depth_u;
     const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
     if (weight == 0) return;
     const Eigen::Vector3d arm = pair.moving - pivot;
@@ -107,44 +120,62 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
 
 Eigen::Index at(int block) { return 7 * Eigen::Index{block}; }
 
-// Unknowns: theta, the photos of T1, the photos of T2; all but theta are eliminated. Block
-// i * (photos of T2) + j holds the pairs of photos i and j.
-SurfaceEquations marginalise(const std::vector<Block>& blocks, const Witnesses& of_t1,
-                             const Witnesses& of_t2, const Eigen::Vector3d& pivot,
-                             const FrameSpread& spread) {
-  const int n1 = of_t1.count(), total = n1 + of_t2.count();
-  Eigen::MatrixXd photos = Eigen::MatrixXd::Zero(at(total), at(total));
-  Eigen::MatrixXd coupling = Eigen::MatrixXd::Zero(at(total), 7);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(at(total));
+// The normal equations of all unknowns: theta, the photos of T1, the photos of T2.
+struct PhotoSystem {
+  Witnesses of_t1, of_t2;
+  Matrix7 information = Matrix7::Zero();
+  Vector7 gradient = Vector7::Zero();
+  Eigen::MatrixXd photos = {};    // the photos' block, their prior included
+  Eigen::MatrixXd coupling = {};  // of the photos with theta
+  Eigen::VectorXd photo_gradient = {};
+  double relative_sigma = 0;
+};
+
+PhotoSystem assemble(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
+                     const FrameSpread& spread, double min_relative_sigma) {
+  std::optional<Witnesses> sides[2];  // at the same time
+  parallel_for(2, 1, [&](int64_t side, int64_t) {
+    if (side == 0) sides[0].emplace(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
+    if (side == 1) sides[1].emplace(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
+  });
+  PhotoSystem system{.of_t1 = std::move(*sides[0]), .of_t2 = std::move(*sides[1])};
+  system.relative_sigma = relative_sigma_of(pairs, min_relative_sigma);
+  const Witnesses &of_t1 = system.of_t1, &of_t2 = system.of_t2;
+  const int n1 = of_t1.count(), n2 = of_t2.count(), total = n1 + n2;
+  // Block i * n2 + j holds the pairs of photos i and j.
+  const auto block_of = [&](const SurfacePair& pair) {
+    return static_cast<size_t>(of_t1.of(pair.frame_t1) * n2 + of_t2.of(pair.frame_t2));
+  };
+  const std::vector<Block> blocks =
+      sum_by_block(pairs, static_cast<size_t>(n1 * n2), block_of, pivot, system.relative_sigma);
+
+  system.photos = Eigen::MatrixXd::Zero(at(total), at(total));
+  system.coupling = Eigen::MatrixXd::Zero(at(total), 7);
+  system.photo_gradient = Eigen::VectorXd::Zero(at(total));
   const Matrix7 prior = spread.covariance().inverse();
-  for (int k = 0; k < total; ++k) photos.block<7, 7>(at(k), at(k)) = prior;
-  SurfaceEquations result;
+  for (int k = 0; k < total; ++k) system.photos.block<7, 7>(at(k), at(k)) = prior;
   for (size_t k = 0; k < blocks.size(); ++k) {
     const Block& block = blocks[k];
     if (block.empty) continue;
-    const int photo1 = static_cast<int>(k) / of_t2.count();
-    const int photo2 = static_cast<int>(k) % of_t2.count();
+    const int photo1 = static_cast<int>(k) / n2;
+    const int photo2 = static_cast<int>(k) % n2;
     const Eigen::Index i = at(photo1), j = at(n1 + photo2);
     // A photo's similarity about its own centre, as parameters about the pivot.
     const Matrix7 a = pivot_change(pivot - of_t1.center(photo1));
     const Matrix7 b = pivot_change(pivot - of_t2.center(photo2));
     const Matrix7 ha = block.information * a, hb = block.information * b;
-    result.information += block.information;
-    result.gradient += block.gradient;
-    photos.block<7, 7>(i, i) += a.transpose() * ha;
-    photos.block<7, 7>(j, j) += b.transpose() * hb;
-    photos.block<7, 7>(i, j) -= a.transpose() * hb;
-    photos.block<7, 7>(j, i) -= b.transpose() * ha;
-    coupling.block<7, 7>(i, 0) += ha.transpose();
-    coupling.block<7, 7>(j, 0) -= hb.transpose();
-    gradient.segment<7>(i) += a.transpose() * block.gradient;
-    gradient.segment<7>(j) -= b.transpose() * block.gradient;
+    system.information += block.information;
+    system.gradient += block.gradient;
+    system.photos.block<7, 7>(i, i) += a.transpose() * ha;
+    system.photos.block<7, 7>(j, j) += b.transpose() * hb;
+    system.photos.block<7, 7>(i, j) -= a.transpose() * hb;
+    system.photos.block<7, 7>(j, i) -= b.transpose() * ha;
+    system.coupling.block<7, 7>(i, 0) += ha.transpose();
+    system.coupling.block<7, 7>(j, 0) -= hb.transpose();
+    system.photo_gradient.segment<7>(i) += a.transpose() * block.gradient;
+    system.photo_gradient.segment<7>(j) -= b.transpose() * block.gradient;
   }
-  const Eigen::LLT<Eigen::MatrixXd> solver(photos);
-  result.gradient -= coupling.transpose() * solver.solve(gradient);
-  result.information -= coupling.transpose() * solver.solve(coupling);
-  result.information = 0.5 * (result.information + result.information.transpose()).eval();
-  return result;
+  return system;
 }
 
 }  // namespace
@@ -162,31 +193,53 @@ double tukey_loss(double residual, double sigma) {
 
 SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
                                    const Eigen::Vector3d& pivot, const FrameSpread* frame_spread,
-                                   double min_sigma_u) {
-  const double sigma = residual_sigma(pairs, min_sigma_u);
+                                   double min_relative_sigma) {
   SurfaceEquations result;
   if (frame_spread) {
-    std::optional<Witnesses> sides[2];  // at the same time
-    parallel_for(2, 1, [&](int64_t side, int64_t) {
-      if (side == 0) sides[0].emplace(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
-      if (side == 1) sides[1].emplace(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
-    });
-    const Witnesses &of_t1 = *sides[0], &of_t2 = *sides[1];
-    const int n1 = of_t1.count(), n2 = of_t2.count();
-    const auto block_of = [&](const SurfacePair& pair) {
-      return static_cast<size_t>(of_t1.of(pair.frame_t1) * n2 + of_t2.of(pair.frame_t2));
-    };
-    const std::vector<Block> blocks =
-        sum_by_block(pairs, static_cast<size_t>(n1 * n2), block_of, pivot, sigma);
-    result = marginalise(blocks, of_t1, of_t2, pivot, *frame_spread);
+    const PhotoSystem system = assemble(pairs, pivot, *frame_spread, min_relative_sigma);
+    const Eigen::LLT<Eigen::MatrixXd> solver(system.photos);
+    result.relative_sigma = system.relative_sigma;
+    result.gradient =
+        system.gradient - system.coupling.transpose() * solver.solve(system.photo_gradient);
+    result.information =
+        system.information - system.coupling.transpose() * solver.solve(system.coupling);
+    result.information = 0.5 * (result.information + result.information.transpose()).eval();
   } else {
+    result.relative_sigma = relative_sigma_of(pairs, min_relative_sigma);
     const Block independent = sum_by_block(
-        pairs, 1, [](const SurfacePair&) { return size_t{0}; }, pivot, sigma)[0];
+        pairs, 1, [](const SurfacePair&) { return size_t{0}; }, pivot, result.relative_sigma)[0];
     result.information = independent.information;
     result.gradient = independent.gradient;
   }
-  result.sigma_u = sigma;
+  result.sigma_u = result.relative_sigma *
+                   median_over(pairs, [](const SurfacePair& pair) { return pair.depth_u; });
   return result;
+}
+
+PhotoErrors photo_errors(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
+                         const FrameSpread& frame_spread, double min_relative_sigma) {
+  const PhotoSystem system = assemble(pairs, pivot, frame_spread, min_relative_sigma);
+  const int n1 = system.of_t1.count(), total = n1 + system.of_t2.count();
+  const Eigen::LLT<Eigen::MatrixXd> solver(system.photos);
+  PhotoErrors result;
+  result.groups_t1 = n1;
+  result.frames_t1 = system.of_t1.frames();
+  result.frames_t2 = system.of_t2.frames();
+  for (int k = 0; k < total; ++k) {
+    result.centers.push_back(k < n1 ? system.of_t1.center(k) : system.of_t2.center(k - n1));
+  }
+  result.mean = -solver.solve(system.photo_gradient);
+  result.response = -solver.solve(system.coupling);
+  result.covariance = solver.solve(Eigen::MatrixXd::Identity(at(total), at(total)));
+  return result;
+}
+
+size_t PhotoErrors::group_of_t1(size_t frame) const {
+  return static_cast<size_t>(group_of(static_cast<int32_t>(frame), frames_t1));
+}
+
+size_t PhotoErrors::group_of_t2(size_t frame) const {
+  return static_cast<size_t>(groups_t1 + group_of(static_cast<int32_t>(frame), frames_t2));
 }
 
 }  // namespace vggtcd

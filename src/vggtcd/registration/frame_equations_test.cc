@@ -58,11 +58,12 @@ TEST(SurfaceEquations, MarginalisedPhotosEqualTheDenseCovariance) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index a = 0; a < n; ++a) {
     const SurfacePair& p = pairs[static_cast<size_t>(a)];
-    const double weight = tukey_weight(p.plane_residual(), actual.sigma_u);
+    const double weight = tukey_weight(p.plane_residual(), actual.relative_sigma);
     if (weight > 0) kept.push_back(a);
     jacobian.row(a) = jacobian_of(p).transpose();
     residual[a] = p.plane_residual();
-    covariance(a, a) += actual.sigma_u * actual.sigma_u / (0.5 * std::max(weight, 1e-30));
+    covariance(a, a) +=
+        actual.relative_sigma * actual.relative_sigma / (0.5 * std::max(weight, 1e-30));
     for (Eigen::Index b = 0; b < n; ++b) {
       const SurfacePair& q = pairs[static_cast<size_t>(b)];
       const auto shared = [&](const Eigen::Vector3d& center) {

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "vggtcd/core/error.h"
 
@@ -34,19 +35,25 @@ Matrix7 fit_covariance(std::span<const KeyframeWitness> witnesses, const Matrix7
 }  // namespace
 
 KeyframeWitness keyframe_witness(std::span<const Eigen::Vector3d> mapped,
-                                 std::span<const Eigen::Vector3d> targets) {
-  check(mapped.size() == targets.size(), "keyframe_witness: one target per point");
+                                 std::span<const Eigen::Vector3d> targets,
+                                 std::span<const double> weights) {
+  check(mapped.size() == targets.size() && mapped.size() == weights.size(),
+        "keyframe_witness: one target and one weight per point");
   KeyframeWitness witness;
   if (mapped.size() < 3) return witness;
-  for (const Eigen::Vector3d& x : mapped) witness.center += x;
-  witness.center /= static_cast<double>(mapped.size());
+  double total = 0;
+  for (size_t i = 0; i < mapped.size(); ++i) {
+    witness.center += weights[i] * mapped[i];
+    total += weights[i];
+  }
+  witness.center /= total;
   Vector7 right_side = Vector7::Zero();
   for (size_t i = 0; i < mapped.size(); ++i) {
     const Eigen::Vector3d arm = mapped[i] - witness.center;
     Eigen::Matrix<double, 3, 7> jacobian = Eigen::Matrix<double, 3, 7>::Zero();
     jacobian.block<3, 7>(0, 0) = pivot_change(arm).block<3, 7>(3, 0);
-    witness.information += jacobian.transpose() * jacobian;
-    right_side += jacobian.transpose() * (targets[i] - mapped[i]);
+    witness.information += weights[i] * jacobian.transpose() * jacobian;
+    right_side += weights[i] * jacobian.transpose() * (targets[i] - mapped[i]);
   }
   const Eigen::LDLT<Matrix7> solver(witness.information);
   constexpr double kSingular = 1e-9;
@@ -87,8 +94,9 @@ InitialUncertainty coarse_uncertainty(std::span<const KeyframeWitness> t1,
   change.block<3, 3>(0, 0) = t2_from_joint.rotation;
   change.block<3, 3>(3, 3) = t2_from_joint.scale * t2_from_joint.rotation;
   result.similarity = {change * covariance * change.transpose(), t2_from_joint * pivot};
-  result.frame = in_joint;
-  result.frame.translation_u *= t2_from_joint.scale;
+  result.frame = {in_joint.rotation_rad / std::numbers::sqrt2,
+                  in_joint.translation_u * t2_from_joint.scale / std::numbers::sqrt2,
+                  in_joint.log_scale / std::numbers::sqrt2};
   return result;
 }
 

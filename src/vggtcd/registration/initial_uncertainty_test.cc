@@ -14,6 +14,8 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
+std::vector<double> ones(const Points& points) { return std::vector<double>(points.size(), 1.0); }
+
 class Draw {
  public:
   explicit Draw(uint32_t seed) : engine_(seed) {}
@@ -50,7 +52,7 @@ std::vector<KeyframeWitness> witnesses_of_a_fit(Draw& draw, int keyframes, Sim3&
   std::vector<KeyframeWitness> result;
   for (size_t k = 0; k < in_epoch.size(); ++k) {
     for (Eigen::Vector3d& x : in_epoch[k]) x = fit * x;
-    result.push_back(keyframe_witness(in_epoch[k], in_joint[k]));
+    result.push_back(keyframe_witness(in_epoch[k], in_joint[k], ones(in_epoch[k])));
   }
   return result;
 }
@@ -63,16 +65,16 @@ TEST(KeyframeWitness, FindsTheSimilarityThatIsLeft) {
   for (const Eigen::Vector3d& x : points) center += x / 50;
   const Vector7 left = (Vector7() << 1, -2, 3, 4, -5, 6, 7).finished() * 1e-4;
   for (const Eigen::Vector3d& x : points) targets.push_back(small_similarity(left, center) * x);
-  const KeyframeWitness witness = keyframe_witness(points, targets);
+  const KeyframeWitness witness = keyframe_witness(points, targets, ones(points));
   EXPECT_LT((witness.center - center).norm(), 1e-12);
   EXPECT_LT((witness.offset - left).norm(), 1e-5);  // second order of 1e-3
 }
 
 TEST(KeyframeWitness, TwoPointsOrALineSayNothing) {
   const Points two{{0, 0, 0}, {1, 0, 0}};
-  EXPECT_EQ(keyframe_witness(two, two).information.norm(), 0);
+  EXPECT_EQ(keyframe_witness(two, two, ones(two)).information.norm(), 0);
   const Points line{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {5, 0, 0}};
-  EXPECT_EQ(keyframe_witness(line, line).information.norm(), 0);
+  EXPECT_EQ(keyframe_witness(line, line, ones(line)).information.norm(), 0);
 }
 
 TEST(CoarseUncertainty, IsAsLargeAsTheErrorsThatAreMade) {

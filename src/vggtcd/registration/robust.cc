@@ -11,6 +11,7 @@
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
+#include "vggtcd/registration/camera_fit.h"
 #include "vggtcd/registration/frame_equations.h"
 #include "vggtcd/registration/surface_pairs.h"
 
@@ -20,7 +21,7 @@ namespace {
 // A step this small in standard deviations of the result ends the iteration.
 constexpr double kConvergedStep = 0.1;
 constexpr double kWeakShare = 0.5;
-// Residuals are never believed to be smaller than this share of the extent: on data without noise
+// Residuals are never believed to be smaller than this share of the depth: on data without noise
 // the rounding of float positions would otherwise count as information.
 constexpr double kSigmaFloor = 1e-4;
 
@@ -164,7 +165,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           const RobustOptions& options) {
   options.validate();
   RobustResult result;
-  result.t2_from_t1 = initial_t2_from_t1;
+  result.t2_from_t1 = result.surface_t2_from_t1 = initial_t2_from_t1;
   result.points_t1 = static_cast<int64_t>(t1.size());
   result.points_t2 = static_cast<int64_t>(t2.size());
   if (result.points_t1 + result.points_t2 < options.min_pairs || t1.size() == 0 || t2.size() == 0) {
@@ -187,10 +188,16 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   std::vector<SurfacePair> pairs;
   Sim3 current = initial_t2_from_t1;
   Matrix7 surface_information = Matrix7::Zero();
+  const auto find_static_pairs = [&] {
+    matcher.pairs(current, options.both_directions, pairs);
+    if (!options.relative_depth) {
+      for (SurfacePair& pair : pairs) pair.depth_u = result.extent_u;
+    }
+    return keep_static(pairs, options);
+  };
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    matcher.pairs(current, options.both_directions, pairs);
-    const Rejected rejected = keep_static(pairs, options);
+    const Rejected rejected = find_static_pairs();
     result.pairs = static_cast<int64_t>(pairs.size());
     result.rejected_far = rejected.far;
     result.rejected_normal = rejected.normal;
@@ -201,9 +208,9 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
           result.pairs, options.min_pairs);
       return result;
     }
-    const SurfaceEquations surface = surface_equations(
-        pairs, result.pivot_in_t2, options.frame_errors ? &result.uncertainty.frame : nullptr,
-        kSigmaFloor * result.extent_u);
+    const SurfaceEquations surface =
+        surface_equations(pairs, result.pivot_in_t2,
+                          options.frame_errors ? &result.uncertainty.frame : nullptr, kSigmaFloor);
     result.residual_sigma_u = surface.sigma_u;
     surface_information = surface.information;
 
@@ -233,7 +240,18 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     return result;
   }
   result.verdict = RobustVerdict::kRefined;
-  result.t2_from_t1 = current;
+  result.t2_from_t1 = result.surface_t2_from_t1 = current;
+  if (options.camera_fit && options.frame_errors) {
+    find_static_pairs();
+    const PhotoErrors photos =
+        photo_errors(pairs, result.pivot_in_t2, result.uncertainty.frame, kSigmaFloor);
+    std::vector<Eigen::Vector3d> cameras_t1 = t1.cameras;
+    for (Eigen::Vector3d& camera : cameras_t1) camera = current * camera;
+    const CameraFit fit =
+        fit_cameras(photos, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance);
+    result.t2_from_t1 = small_similarity(fit.step, result.pivot_in_t2) * current;
+    result.covariance = fit.covariance;
+  }
   result.explanation = fmt::format(
       "Refined rotation, translation and scale on {} static surface pairs; they fit to {:.3g}.",
       result.pairs, result.residual_sigma_u);

@@ -25,6 +25,8 @@ struct RobustOptions {
   bool both_directions = true;       // also search from T2 to T1
   bool measured_uncertainty = true;  // of the initial similarity and of a photo, from the keyframes
   bool frame_errors = true;          // a photo errs as a whole; false: points are independent
+  bool relative_depth = true;        // errors grow with the distance from the camera
+  bool camera_fit = true;            // carry the cameras, not only the surfaces (camera_fit.h)
   // Where nothing is measured: rotation (rad), log scale, translation / extent.
   double prior_sigma = 0.02;   // of the initial similarity; > 0
   double frame_sigma = 0.002;  // of one photo; > 0
@@ -48,6 +50,13 @@ struct RobustOptions {
         "Robust: a photo's points may be misplaced, tilted and scaled as a whole; else all points "
         "are taken for independent.");
     field(
+        "relative_depth", self.relative_depth,
+        "Robust: points err in proportion to their distance from the camera, in the joint pass as "
+        "on the surfaces; else all points alike.");
+    field("camera_fit", self.camera_fit,
+          "Robust: the similarity that carries the cameras, by what their photos show, is the "
+          "result; else the one that fits the surfaces. Needs frame-errors.");
+    field(
         "prior_sigma", self.prior_sigma,
         "Robust: assumed standard deviation of the initial alignment's rotation (rad), log scale, "
         "and translation as a share of the scene extent, where nothing is measured.");
@@ -67,14 +76,15 @@ enum class RobustVerdict {
 std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict);
 
 struct RobustResult {
-  Sim3 t2_from_t1;
+  Sim3 t2_from_t1;          // carries the cameras, if asked for (camera_fit)
+  Sim3 surface_t2_from_t1;  // fits the surfaces
   RobustVerdict verdict = RobustVerdict::kKeptInitialFewPairs;
   std::string explanation;
 
   Eigen::Vector3d pivot_in_t2 = Eigen::Vector3d::Zero();
   double extent_u = 0;  // robust extent of T2's points
-  // Of the seven parameters about the pivot, from the surfaces and the initial uncertainty. It is
-  // that of the surfaces: where a pass bends its world, cameras may be off by more.
+  // Of the seven parameters of t2_from_t1 about the pivot, from the surfaces, the photos' own
+  // errors and the initial uncertainty.
   Matrix7 covariance = Matrix7::Zero();
   // Per degree of freedom, 0 to 1: the share of what is known about it that comes from the static
   // surfaces (the rest is the initial similarity): one minus the ratio of variances. A plane leaves
@@ -90,13 +100,14 @@ struct RobustResult {
   InitialUncertainty uncertainty;  // what was assumed or measured beforehand
   bool uncertainty_measured = false;
   bool converged = false;  // the last step was below a tenth of a standard deviation
-  double cost_initial = 0, cost_final = 0;  // surface_cost with the final scale
+  double cost_initial = 0, cost_final = 0;  // surface_cost of the surfaces' similarity
 };
 
-// Gauss-Newton on r = n . (T x - y) over the nearest pairs, Tukey weights, gates on distance and
-// normals, photos that may err as a whole (frame_equations.h), and the initial similarity with its
-// uncertainty as prior: the maximum a posteriori. `measured` is what the coarse stage knows about
-// itself (coarse_uncertainty); without it prior_sigma and frame_sigma stand in.
+// Gauss-Newton on r = n . (T x - y), whose deviation grows with depth, over the nearest pairs,
+// Tukey weights, gates on distance and normals, photos that may err as a whole (frame_equations.h),
+// and the initial similarity with its uncertainty as prior: the maximum a posteriori. `measured` is
+// what the coarse stage knows about itself (coarse_uncertainty); without it prior_sigma and
+// frame_sigma stand in.
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           const Sim3& initial_t2_from_t1,
                           const std::optional<InitialUncertainty>& measured,

@@ -32,6 +32,10 @@ void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
     pair.frame_t1 = t1_.frames[i1];
     pair.frame_t2 = t2_.frames[i2];
     pair.from_t1 = search_from_t1;
+    const Eigen::Vector3d camera1 = t2_from_t1 * t1_.cameras[static_cast<size_t>(pair.frame_t1)];
+    const Eigen::Vector3d& camera2 = t2_.cameras[static_cast<size_t>(pair.frame_t2)];
+    pair.depth_u = std::sqrt(
+        0.5 * ((pair.moving - camera1).squaredNorm() + (pair.fixed - camera2).squaredNorm()));
     return pair;
   };
   constexpr int64_t kGrain = 1 << 13;

@@ -154,6 +154,9 @@ OrientedPoints oriented_points(const Reconstruction& reconstruction, int grid_re
   surfels.insert(surfels.end(), others.begin(), others.end());
   std::ranges::sort(surfels, {}, &Surfel::point);
 
+  for (const View& view : reconstruction.views) {
+    result.cameras.push_back(camera_center(view.camera_from_world));
+  }
   for (const Surfel& surfel : surfels) {
     result.positions.push_back(cloud.positions[surfel.point]);
     result.normals.push_back(surfel.normal);

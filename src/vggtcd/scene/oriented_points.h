@@ -15,7 +15,8 @@ namespace vggtcd {
 struct OrientedPoints {
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;
-  std::vector<int32_t> frames;  // the frame each point was taken from
+  std::vector<int32_t> frames;           // the frame each point was taken from
+  std::vector<Eigen::Vector3d> cameras;  // the centre of every frame's camera
   double voxel_size_u = 0;
 
   size_t size() const { return positions.size(); }

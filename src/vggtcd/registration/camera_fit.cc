@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// From aligned surfaces to aligned cameras, by least squares over the photos' own similarities.
+#include "vggtcd/registration/camera_fit.h"
+
+#include <Eigen/Cholesky>
+
+namespace vggtcd {
+namespace {
+
+constexpr double kSurfaceWeight = 0.1;  // of what a photo shows against its camera
+constexpr double kBallShare = 0.5;      // radius of the ball around it, of the viewing distance
+
+// J^T J of the displacement of x by a small similarity about the pivot.
+Matrix7 information_at(const Eigen::Vector3d& x, const Eigen::Vector3d& pivot) {
+  const Eigen::Matrix<double, 3, 7> jacobian = pivot_change(x - pivot).block<3, 7>(3, 0);
+  return jacobian.transpose() * jacobian;
+}
+
+// How much a photo's similarity counts, about the pivot.
+Matrix7 photo_weight(const Eigen::Vector3d& camera, const Eigen::Vector3d& shown,
+                     const Eigen::Vector3d& pivot) {
+  const double radius = kBallShare * (shown - camera).norm();
+  Matrix7 ball = Matrix7::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-radius, radius}) {
+      ball += information_at(shown + side * Eigen::Vector3d::Unit(axis), pivot) / 6;
+    }
+  }
+  return information_at(camera, pivot) + kSurfaceWeight * ball;
+}
+
+}  // namespace
+
+CameraFit fit_cameras(const PhotoErrors& photos, std::span<const Eigen::Vector3d> cameras_t1,
+                      std::span<const Eigen::Vector3d> cameras_t2, const Eigen::Vector3d& pivot,
+                      const Matrix7& surface_covariance) {
+  // The answer is theta + fit * b: both epochs' weighted means of their photos' similarities.
+  Eigen::MatrixXd fit = Eigen::MatrixXd::Zero(7, photos.mean.size());
+  const auto add_epoch = [&](std::span<const Eigen::Vector3d> cameras, int frames, bool is_t1) {
+    Matrix7 total = Matrix7::Zero();
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(7, photos.mean.size());
+    const size_t count = std::min(cameras.size(), static_cast<size_t>(frames));
+    for (size_t frame = 0; frame < count; ++frame) {
+      const size_t group = is_t1 ? photos.group_of_t1(frame) : photos.group_of_t2(frame);
+      const Eigen::Vector3d& center = photos.centers[group];
+      const Matrix7 weight = photo_weight(cameras[frame], center, pivot);
+      total += weight;
+      sum.block<7, 7>(0, 7 * static_cast<Eigen::Index>(group)) +=
+          weight * pivot_change(pivot - center);
+    }
+    fit += (is_t1 ? 1.0 : -1.0) * total.ldlt().solve(sum);
+  };
+  add_epoch(cameras_t1, photos.frames_t1, true);
+  add_epoch(cameras_t2, photos.frames_t2, false);
+
+  CameraFit result;
+  result.step = fit * photos.mean;
+  const Matrix7 response = Matrix7::Identity() + fit * photos.response;
+  result.covariance = response * surface_covariance * response.transpose() +
+                      fit * photos.covariance * fit.transpose();
+  return result;
+}
+
+}  // namespace vggtcd

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// From aligned surfaces to aligned cameras: the similarity that carries the cameras of one epoch
+// into the other, where photos err as a whole.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+#include "vggtcd/registration/frame_equations.h"
+#include "vggtcd/registration/small_similarity.h"
+
+namespace vggtcd {
+
+struct CameraFit {
+  Vector7 step = Vector7::Zero();  // about the pivot, on top of the surfaces' similarity
+  Matrix7 covariance = Matrix7::Zero();
+};
+
+// A reconstruction is bent, so the similarity that lays its surfaces best onto the other epoch's is
+// not the one that carries its cameras best; but a camera is tied to what its photo shows. If photo
+// i of T1 errs by b_i against the common world, its camera belongs at (theta + b_i) c_i, and c_j of
+// T2 at b_j c_j. The answer is theta + S1 - S2, where S_e fits the b of its epoch's photos by least
+// squares: at the cameras' centres with weight 1, and with weight kSurfaceWeight over a ball around
+// what each photo shows (which keeps the rotation about a straight walk). `cameras_t1` are mapped
+// into T2 by the surfaces' similarity, whose covariance about the pivot is given. Frames without
+// pairs of their own count by their group, or not at all beyond the last frame that has pairs.
+CameraFit fit_cameras(const PhotoErrors& photos, std::span<const Eigen::Vector3d> cameras_t1,
+                      std::span<const Eigen::Vector3d> cameras_t2, const Eigen::Vector3d& pivot,
+                      const Matrix7& surface_covariance);
+
+}  // namespace vggtcd
