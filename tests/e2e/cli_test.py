@@ -305,6 +305,217 @@ class Detect(unittest.TestCase):
         self.assertEqual([p for p in self.root.iterdir() if "interrupted" in p.name], [])
 
 
+class Metres(unittest.TestCase):
+    """The bundled kitchen: its truth is in metres."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.temporary.name)
+        cls.truth = np.load(EXAMPLE / "truth.npz")
+        cls.inputs = ["detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz", "--no-overlays"]
+        cls.metres_per_unit = 1 / json.loads((EXAMPLE / "truth.json").read_text())["t2_from_world"]["scale"]
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def true_points(self, epoch, frame):
+        """[H, W, 3] in metres; NaN where there is only sky."""
+        depth = self.truth[f"depth_{epoch}"][frame].astype(float)
+        depth[depth <= 0] = np.nan
+        k, extrinsic = self.truth[f"intrinsic_{epoch}"][frame], self.truth[f"extrinsic_{epoch}"][frame]
+        v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
+        rays = np.stack([(u - k[0, 2]) / k[0, 0], (v - k[1, 2]) / k[1, 1], np.ones_like(depth)], -1)
+        return (depth[..., None] * rays - extrinsic[:, 3]) @ extrinsic[:, :3]
+
+    def distance(self, epoch, frame, a, b):
+        """The arguments for a distance between two pixels, true to the millimetre."""
+        points = self.true_points(epoch, frame)
+        name = {"t1": "before", "t2": "after"}[epoch]
+        length = np.linalg.norm(points[a[1], a[0]] - points[b[1], b[0]])
+        return ["--known-distance", f"{a[0]},{a[1]},{name}/{frame}", f"{b[0]},{b[1]},{name}/000{frame}.jpg", f"{length:.3f}"]
+
+    def detect(self, name, *arguments):
+        out = self.root / name
+        done = run(*self.inputs, *arguments, "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return out, done.stdout
+
+    def test_known_distances_give_metres(self):
+        plain, said = self.detect("plain")
+        self.assertIn("Lengths are in scene units", said)
+        known = [*self.distance("t2", 0, (40, 40), (160, 100)), *self.distance("t1", 2, (30, 110), (170, 60)),
+                 *self.distance("t2", 4, (60, 120), (150, 30))]
+        out, said = self.detect("known", *known)
+        self.assertRegex(said, r"1 scene unit is \d\.\d+ m \(standard error [\d.]+ %\), from 3 known distances")
+        metric = json.loads((out / "summary.json").read_text())["metric"]
+        # The reconstruction bends its world by about a per cent; three of its lengths average that.
+        self.assertAlmostEqual(metric["metres_per_unit"] / self.metres_per_unit, 1, delta=0.03)
+        self.assertGreater(metric["relative_sigma"], 0)
+        self.assertEqual(len(metric["known_distances"]), 3)
+        into = json.loads((out / "sim3.json").read_text())["metres_from_t2"]
+        self.assertEqual(into["scale"], metric["metres_per_unit"])
+        self.assertEqual(into["translation"], [0, 0, 0])
+        # Every length of the results is that of the plain ones times the scale.
+        s = into["scale"]
+        for name in ("before_aligned", "after"):
+            a, b = read_ply(plain / f"{name}.ply"), read_ply(out / f"{name}.ply")
+            for field in ("x", "y", "z", "scalar_change_distance", "scalar_level_of_detection"):
+                np.testing.assert_allclose(b[field], s * a[field], rtol=1e-5, atol=1e-6)
+            np.testing.assert_array_equal(a["scalar_label"], b["scalar_label"])
+        self.assertIn(b"comment frame: T2, unit: m\n", (out / "after.ply").read_bytes()[:400])
+        a, b = np.load(plain / "change.npz"), np.load(out / "change.npz")
+        self.assertEqual((a["unit"].tolist(), b["unit"].tolist()), (["u"], ["m"]))
+        for field in ("score", "gap", "level_of_detection"):
+            np.testing.assert_allclose(b[f"{field}_t1"], s * a[f"{field}_t1"], rtol=1e-5, atol=1e-6)
+        np.testing.assert_array_equal(a["instance_t2"], b["instance_t2"])
+        a, b = (json.loads((d / "changes.json").read_text()) for d in (plain, out))
+        self.assertEqual((a["unit"], b["unit"]), ("u", "m"))
+        for plain_thing, thing in zip(a["changes"], b["changes"], strict=True):
+            self.assertAlmostEqual(thing["volume_m3"], s ** 3 * plain_thing["volume_u3"])
+            self.assertGreater(thing["volume_sigma_m3"], s ** 3 * plain_thing["volume_sigma_u3"])
+            np.testing.assert_allclose(thing["center"], s * np.array(plain_thing["center"]))
+        header = (out / "changes.csv").read_text().splitlines()[0]
+        self.assertIn("volume_m3", header)
+        self.assertNotIn("_u", header.replace("_unit", ""))
+        self.assertIn('"unit":"m"', (out / "report.html").read_text().replace('": ', '":'))
+
+    def test_reference_cameras_give_their_frame(self):
+        lines = ["photo,x,y,z"]
+        for epoch, name in (("t1", "before"), ("t2", "after")):
+            for frame, pose in enumerate(self.truth[f"extrinsic_{epoch}"]):
+                center = -pose[:, :3].T @ pose[:, 3]
+                lines.append(f"{name}/{frame:04d}.jpg," + ",".join(f"{c:.4f}" for c in center))
+        table = self.root / "cameras.csv"
+        table.write_text("\n".join(lines) + "\n")
+        out, said = self.detect("reference", "--reference", table)
+        self.assertIn("from 12 reference cameras", said)
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertEqual(summary["inputs"]["reference"], "cameras.csv")
+        self.assertEqual(summary["change"]["frame"], "reference")
+        # The cameras of the results fit the table as well as they can: what Kabsch's rotation, the ratio of spreads and
+        # the difference of means would still change is nothing.
+        ours = np.concatenate([np.loadtxt(out / f"cameras_{name}.tum")[:, 1:4] for name in ("before", "after")])
+        theirs = np.array([line.split(",")[1:] for line in lines[1:]], float)
+        np.testing.assert_allclose(ours.mean(0), theirs.mean(0), atol=1e-5)
+        a, b = ours - ours.mean(0), theirs - theirs.mean(0)
+        u, d, vt = np.linalg.svd(b.T @ a)
+        np.testing.assert_allclose(u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt, np.eye(3), atol=1e-5)
+        self.assertAlmostEqual(d.sum() / (a ** 2).sum(), 1, places=4)
+        rms = np.sqrt(((ours - theirs) ** 2).sum(-1).mean())
+        self.assertAlmostEqual(summary["metric"]["rms_residual_m"], rms, places=5)
+        # Points lie in the true room as well as the walk (2.9 m long, 0.2 m wide) can tell: three deviations of a turn
+        # about it at the room's distance.
+        ply, change = read_ply(out / "after.ply"), np.load(out / "change.npz")
+        true = np.stack([self.true_points("t2", frame) for frame in range(6)])[change["label_t2"] != 255]
+        off = np.linalg.norm(np.stack([ply["x"], ply["y"], ply["z"]], -1) - true, axis=-1)
+        self.assertLess(np.nanmedian(off), 3 * np.radians(summary["metric"]["rotation_sigma_deg"]) * 2.5)
+        # A TUM file of T2's cameras, as another program would write it.
+        tum = self.root / "cameras.tum"
+        tum.write_text("".join(f"{i}.0 {' '.join(line.split(',')[1:])} 0 0 0 1\n" for i, line in enumerate(lines[7:])))
+        out, said = self.detect("tum", "--reference", tum)
+        self.assertIn("from 6 reference cameras", said)
+
+    def test_register_tells_the_metre(self):
+        out = self.root / "register"
+        done = run("register", *self.inputs[1:-1], *self.distance("t2", 0, (40, 40), (160, 100)), "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        into = json.loads((out / "sim3.json").read_text())["metres_from_t2"]
+        self.assertAlmostEqual(into["scale"] / self.metres_per_unit, 1, delta=0.05)
+        self.assertIsNone(into["scale_sigma_relative"])
+
+    def test_what_cannot_be_is_one_line(self):
+        out = self.root / "bad"
+        table = self.root / "two.txt"
+        table.write_text("after/0 0 0 0\nafter/1 1 0 0\n")
+        for status, word, arguments in (
+                (2, "expected one of them", ["--known-distance", "1,1,after/0", "9,9,after/0", "1", "--reference", table]),
+                (2, "number of metres", ["--known-distance", "1,1,after/0", "9,9,after/0", "2.4m"]),
+                (2, "no photo", ["--known-distance", "1,1,after/9", "9,9,after/0", "1"]),
+                (3, "at least 3 cameras", ["--reference", table]),
+                (3, "nowhere.txt", ["--reference", self.root / "nowhere.txt"]),
+                (5, "contradict", ["--known-distance", "40,40,after/0", "160,100,after/0", "1",
+                                   "--known-distance", "40,40,after/0", "160,100,after/0", "3"])):
+            done = run(*self.inputs, *arguments, "-o", out)
+            self.assertEqual(done.returncode, status, done.stderr)
+            lines = [line for line in done.stderr.splitlines() if line.startswith("vggt-cd:")]
+            self.assertEqual(len(lines), 1, done.stderr)
+            self.assertIn(word, lines[0])
+            self.assertFalse(out.exists())
+
+
+class Explain(unittest.TestCase):
+    """What --explain prints and writes agrees with change.npz and with the photos."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.temporary.name)
+        cls.inputs = ["detect", EXAMPLE / "t1.npz", EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz",
+                      "--no-overlays", "--no-page"]
+        done = run(*cls.inputs, "-o", cls.root / "plain")
+        assert done.returncode == 0, done.stderr
+        cls.change = np.load(cls.root / "plain" / "change.npz")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def pixel_with(self, epoch, label, least_confidence):
+        sure = np.nan_to_num(self.change[f"confidence_{epoch}"], nan=1.0) >= least_confidence
+        frame, y, x = np.argwhere((self.change[f"label_{epoch}"] == label) & sure)[0]
+        return int(frame), int(x), int(y)
+
+    def test_the_reasons_are_those_of_the_answer(self):
+        for name, epoch, label, word in (("before", "t1", 1, "removed"), ("after", "t2", 2, "added"),
+                                         ("before", "t1", 0, "unchanged"), ("after", "t2", 3, "unobserved")):
+            frame, x, y = self.pixel_with(epoch, label, 0.9)
+            out = self.root / word
+            done = run(*self.inputs, "--explain", f"{x},{y},{name}/{frame}", "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            why = json.loads((out / "explain.json").read_text())
+            self.assertEqual((why["photo"], why["pixel"], why["label"]), (f"{name}/{frame:04d}.jpg", [x, y], word))
+            self.assertIn(why["sentence"], done.stdout)
+            self.assertIn(word, why["sentence"])
+            for key in ("confidence", "gap_u", "level_of_detection_u"):
+                value = self.change[f"{key.removesuffix('_u')}_{epoch}"][frame, y, x]
+                self.assertEqual(why[key], None if np.isnan(value) else value)
+            votes = [photo for photo in why["photos"] if photo["weight"] > 0]
+            self.assertTrue(all(photo["vote"] in ("sees", "looks_through") for photo in votes))
+            for photo in why["photos"]:
+                self.assertIn(photo["photo"], done.stdout)
+                self.assertTrue(photo["photo"].startswith("after/" if name == "before" else "before/"))
+            if word in ("removed", "added"):
+                self.assertGreaterEqual(why["through_share"], why["min_through_share"])
+
+    def test_asking_does_not_change_the_answer(self):
+        out = self.root / "asked"
+        self.assertEqual(run(*self.inputs, "--explain", "50,50,after/2", "-o", out).returncode, 0)
+        self.assertEqual((out / "change.npz").read_bytes(), (self.root / "plain" / "change.npz").read_bytes())
+
+    def test_in_metres_when_metres_are_known(self):
+        out = self.root / "metres"
+        frame, x, y = self.pixel_with("t2", 2, 0.9)
+        done = run(*self.inputs, "--explain", f"{x},{y},after/{frame}", "--known-distance", "40,40,after/0",
+                   "160,100,after/0", "3", "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        why = json.loads((out / "explain.json").read_text())
+        self.assertEqual(why["unit"], "m")
+        scale = json.loads((out / "sim3.json").read_text())["metres_from_t2"]["scale"]
+        self.assertAlmostEqual(why["gap_m"], scale * float(self.change["gap_t2"][frame, y, x]), delta=1e-5)
+        self.assertRegex(why["sentence"], r"mean gap [\d.e-]+ m,")
+
+    def test_a_question_without_an_answer_is_one_line(self):
+        for word, arguments in (("no photo", ["--explain", "1,1,after/x.jpg"]), ("outside", ["--explain", "999,1,after/0"]),
+                                ("expected X,Y", ["--explain", "1,1"]),
+                                ("free_space", ["--explain", "1,1,after/0", "--method", "paper"])):
+            done = run(*self.inputs, *arguments, "-o", self.root / "bad")
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn(word, done.stderr)
+            self.assertFalse((self.root / "bad").exists())
+
+
 class Help(unittest.TestCase):
     def test_every_level_explains_itself(self):
         top = run("--help")

@@ -47,8 +47,10 @@ export interface Change {
   class?: string;
   center: [number, number, number];
   size: [number, number, number];
-  volume_u3?: number;
+  volume_u3?: number;  // or, in metres:
+  volume_m3?: number;
   volume_sigma_u3?: number;
+  volume_sigma_m3?: number;
   confidence?: number;
   share?: number;
 }

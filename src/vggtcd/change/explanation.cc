@@ -19,22 +19,12 @@ std::optional<int> whole_number(std::string_view text) {
   return value;
 }
 
-// A name wins over a number: photos may be named 0, 1, 2 in another order.
-std::optional<int> frame_of(const Reconstruction& epoch, std::string_view photo) {
-  for (int frame = 0; frame < epoch.num_frames(); ++frame) {
-    if (epoch.views[static_cast<size_t>(frame)].name == photo) return frame;
-  }
-  const auto number = whole_number(photo);
-  if (number && *number >= 0 && *number < epoch.num_frames()) return number;
-  return {};
-}
-
 struct QuestionText {
   PixelQuestion question;  // but for the frame
   std::string_view photo;
 };
 
-QuestionText split_question(std::string_view text) {
+QuestionText split_question(std::string_view text, std::string_view option) {
   const size_t first = text.find(','), second = text.find(',', first + 1);
   const size_t slash = second == text.npos ? text.npos : text.find('/', second);
   std::optional<int> x, y;
@@ -45,40 +35,43 @@ QuestionText split_question(std::string_view text) {
     epoch = text.substr(second + 1, slash - second - 1);
   }
   if (!x || !y || (epoch != "before" && epoch != "after")) {
-    throw_error(ErrorCode::kUsage,
-                "explain: expected X,Y,before/PHOTO or X,Y,after/PHOTO, found \"{}\"", text);
+    throw_error(ErrorCode::kUsage, "{}: expected X,Y,before/PHOTO or X,Y,after/PHOTO, found \"{}\"",
+                option, text);
   }
   return {{epoch == "after", 0, *x, *y}, text.substr(slash + 1)};
 }
 
 }  // namespace
 
-void check_pixel_question(std::string_view text) { split_question(text); }
+void check_pixel_question(std::string_view text, std::string_view option) {
+  split_question(text, option);
+}
 
 PixelQuestion parse_pixel_question(std::string_view text, const Reconstruction& before,
-                                   const Reconstruction& after) {
-  auto [question, photo] = split_question(text);
+                                   const Reconstruction& after, std::string_view option) {
+  auto [question, photo] = split_question(text, option);
   const Reconstruction& epoch = question.in_after ? after : before;
-  const auto frame = frame_of(epoch, photo);
+  const auto frame = find_frame(epoch, photo);
   if (!frame) {
     throw_error(ErrorCode::kUsage,
-                "explain: no photo \"{}\" in the {} epoch; give one of its names ({}, ...) or a "
+                "{}: no photo \"{}\" in the {} epoch; give one of its names ({}, ...) or a "
                 "number from 0 to {}",
-                photo, question.in_after ? "after" : "before", epoch.views.front().name,
+                option, photo, question.in_after ? "after" : "before", epoch.views.front().name,
                 epoch.num_frames() - 1);
   }
   question.frame = *frame;
   if (question.x < 0 || question.x >= epoch.width || question.y < 0 || question.y >= epoch.height) {
-    throw_error(ErrorCode::kUsage,
-                "explain: pixel {},{} lies outside the photo, which was analysed at {} x {}: give "
-                "X from 0 to {} and Y from 0 to {}",
-                question.x, question.y, epoch.width, epoch.height, epoch.width - 1,
-                epoch.height - 1);
+    throw_error(
+        ErrorCode::kUsage,
+        "{}: pixel {},{} lies outside the photo, which was analysed at {} x {}: give X from "
+        "0 to {} and Y from 0 to {}",
+        option, question.x, question.y, epoch.width, epoch.height, epoch.width - 1,
+        epoch.height - 1);
   }
   return question;
 }
 
-std::string explanation_sentence(const PixelExplanation& why) {
+std::string explanation_sentence(const PixelExplanation& why, std::string_view unit) {
   const std::string where =
       fmt::format("Pixel {},{} of {}", why.question.x, why.question.y, why.photo);
   if (why.label == ChangeLabel::kNoEvidence) {
@@ -94,9 +87,9 @@ std::string explanation_sentence(const PixelExplanation& why) {
     text += fmt::format(
         "{} with confidence {:.2f}. Around it {:.1f} photos could tell on average, and {:.0f} % of "
         "their weight looks "
-        "through (changed from {:.0f} %); mean gap {:.3g}, level of detection {:.3g}.",
+        "through (changed from {:.0f} %); mean gap {:.3g} {}, level of detection {:.3g} {}.",
         enum_to_string(why.label), why.confidence, why.votes, 100 * why.through_share,
-        100 * why.min_through_share, why.gap_u, why.level_of_detection_u);
+        100 * why.min_through_share, why.gap_u, unit, why.level_of_detection_u, unit);
     if (is_change(why.label) != (why.through_share >= why.min_through_share)) {
       text += " The votes alone say otherwise; the median of the pixels around it decided.";
     }

@@ -21,13 +21,14 @@ struct PixelQuestion {
 };
 
 // "X,Y,PHOTO", PHOTO one of before/NAME and after/NAME, or the photo's number from 0 instead of its
-// name. Throws Error{kUsage} if the text is not one, if there is no such photo, or if the pixel
-// lies outside it.
+// name. Throws Error{kUsage} naming the option if the text is not one, if there is no such photo,
+// or if the pixel lies outside it.
 PixelQuestion parse_pixel_question(std::string_view text, const Reconstruction& before,
-                                   const Reconstruction& after);
+                                   const Reconstruction& after,
+                                   std::string_view option = "explain");
 
 // The same of the text alone, before any photo is known. Throws Error{kUsage}.
-void check_pixel_question(std::string_view text);
+void check_pixel_question(std::string_view text, std::string_view option = "explain");
 
 struct PhotoTestimony {
   std::string photo;   // of the other epoch: before/NAME or after/NAME
@@ -49,8 +50,9 @@ struct PixelExplanation {
   float confidence = 0, gap_u = 0, level_of_detection_u = 0;  // NaN where nothing was judged
 };
 
-// The answer and its reasons in a sentence or two.
-std::string explanation_sentence(const PixelExplanation& explanation);
+// The answer and its reasons in a sentence or two; `unit` is that of the lengths.
+std::string explanation_sentence(const PixelExplanation& explanation,
+                                 std::string_view unit = "scene units");
 
 // A line per photo that was asked, under a header, each ended by a newline.
 std::string explanation_table(const PixelExplanation& explanation);

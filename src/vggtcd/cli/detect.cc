@@ -33,6 +33,7 @@ void add_detect(Program& program) {
     ReconstructedPhotos photos;
     if (names_photos(epochs.before) || names_photos(epochs.after)) {
       arguments->options.validate();
+      const MetricInputs metric = epochs.metric();
       arguments->photos.before = epochs.before;
       arguments->photos.after = epochs.after;
       epochs.require_none();
@@ -43,6 +44,7 @@ void add_detect(Program& program) {
       photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);
       fmt::print("{}\n", photos.explanation);
       inputs = photos.inputs;
+      inputs.metric = metric;
     } else {
       inputs = epochs.inputs();
       if (arguments->dry_run) {
@@ -64,9 +66,13 @@ void add_detect(Program& program) {
     fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
                outcome.moved);
     if (outcome.explanation) {
-      fmt::print("{}\n{}", explanation_sentence(*outcome.explanation),
+      fmt::print("{}\n{}",
+                 explanation_sentence(*outcome.explanation, outcome.metric ? "m" : "scene units"),
                  explanation_table(*outcome.explanation));
     }
+    fmt::print("{}\n", outcome.metric ? metric_sentence(*outcome.metric)
+                                      : "Lengths are in scene units; --known-distance or "
+                                        "--reference gives metres.");
     fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
                arguments->options.page ? epochs.out + "/report.html, " : "",
                arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
@@ -113,7 +119,10 @@ void add_detect(Program& program) {
       "  vggt-cd detect before.mp4 'after/*.jpg' --frames 30 -o out\n"
       "  vggt-cd detect t1.npz after/ -o out\n"
       "  vggt-cd detect t1.npz t2.npz --joint joint.npz -o out\n"
-      "  vggt-cd detect t1.npz t2.npz --joint joint.npz --explain 120,88,after/3 -o out\n\n"
+      "  vggt-cd detect t1.npz t2.npz --joint joint.npz --explain 120,88,after/3 -o out\n"
+      "  vggt-cd detect before/ after/ --known-distance 87,310,after/door.jpg "
+      "160,308,after/door.jpg 0.88 -o out\n"
+      "  vggt-cd detect before/ after/ --reference surveyed.csv -o out\n\n"
       "Photos: each side a folder, a pattern or a video; or one side a prediction file that holds "
       "its images. Without network\nweights they are reconstructed by COLMAP and plane-sweep "
       "depth, a fallback that refuses what it cannot place. Finished\nstages are kept in "

@@ -3,8 +3,25 @@
 #include "vggtcd/cli/epoch_arguments.h"
 
 #include <fmt/format.h>
+#include <charconv>
 
 namespace vggtcd::cli {
+namespace {
+
+constexpr const char* kMetres = "Metres (one of the two)";
+
+double metres_of(const std::string& text) {
+  double metres = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), metres);
+  if (error != std::errc{} || end != text.data() + text.size()) {
+    throw_error(ErrorCode::kUsage,
+                "--known-distance: expected A B METRES with a number of metres, found \"{}\"",
+                text);
+  }
+  return metres;
+}
+
+}  // namespace
 
 void EpochArguments::add_to(CLI::App* command) {
   command
@@ -29,6 +46,39 @@ void EpochArguments::add_to(CLI::App* command) {
       ->group("How the epochs come together (predictions: exactly one)");
   command->add_flag("--aligned", aligned, "Both epochs are in one frame and scale already.")
       ->group("How the epochs come together (predictions: exactly one)");
+  command
+      ->add_option("--known-distance", known_distances,
+                   "Two pixels and the distance in metres of what they show, measured on site: "
+                   "all results are in metres then. A and B are X,Y,before/PHOTO or "
+                   "X,Y,after/PHOTO, PHOTO a name or a number from 0; 0,0 is the top left pixel. "
+                   "Give it again for every distance that is known: the scale is their "
+                   "least-squares fit, and how they disagree its standard error.")
+      ->type_name("A B METRES")
+      ->type_size(3)
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->group(kMetres);
+  command
+      ->add_option(
+          "--reference", reference,
+          "Where at least three cameras stood, in metres: a table with NAME X Y Z a line "
+          "(or CSV), a COLMAP model, or a TUM file (its time stamps are numbers of AFTER's "
+          "photos from 0). NAME is a photo, with before/ or after/ where both have it. All "
+          "results are in metres and in the frame of the table then.")
+      ->type_name("FILE")
+      ->group(kMetres);
+}
+
+MetricInputs EpochArguments::metric() const {
+  check(known_distances.size() % 3 == 0, "--known-distance: three values each");
+  MetricInputs metric;
+  for (size_t i = 0; i < known_distances.size(); i += 3) {
+    metric.known_distances.push_back(
+        {known_distances[i], known_distances[i + 1], metres_of(known_distances[i + 2])});
+  }
+  if (!reference.empty()) metric.reference = reference;
+  metric.validate();
+  return metric;
 }
 
 void print_plausibility(const Alignment& alignment) {
@@ -61,6 +111,7 @@ EpochInputs EpochArguments::inputs() const {
   if (!joint.empty()) inputs.joint = joint;
   if (!initial_sim3.empty()) inputs.initial_sim3 = initial_sim3;
   inputs.aligned = aligned;
+  inputs.metric = metric();
   return inputs;
 }
 

@@ -1,22 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// The arguments that detect and register share: two epochs and what brings them together.
+// The arguments that detect and register share: two epochs, what brings them together, and what is
+// known in metres.
 #pragma once
 
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "vggtcd/pipeline/detect.h"
 
 namespace vggtcd::cli {
 
 struct EpochArguments {
-  std::string before, after, joint, initial_sim3, out;
+  std::string before, after, joint, initial_sim3, reference, out;
+  std::vector<std::string> known_distances;  // A, B, METRES each
   bool aligned = false;
 
   void add_to(CLI::App* command);
   // Throws Error{kUsage} unless exactly one of --joint, --initial-sim3 and --aligned was given.
   EpochInputs inputs() const;
+  // Throws Error{kUsage}.
+  MetricInputs metric() const;
   // For photos, which need none of them: throws Error{kUsage} if one was given.
   void require_none() const;
 };

@@ -20,12 +20,13 @@ void add_register(Program& program) {
   CLI::App* command = add_command(
       program, program.app, "register", "Align two epochs; no change detection.",
       [arguments](ProgressSink& progress) {
-        const Alignment alignment =
+        const auto [alignment, metric] =
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);
         print_plausibility(alignment);
         fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n", alignment.explanation,
                    arguments->epochs.out, alignment.t2_from_t1.scale);
+        if (metric) fmt::print("{}\n", metric_sentence(*metric));
       });
   arguments->epochs.add_to(command);
   add_fields(command, arguments->options, "Alignment");

@@ -12,8 +12,10 @@
 
 namespace vggtcd {
 
-void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
-  std::string text = "# timestamp tx ty tz qx qy qz qw\n";
+void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
+               std::string_view comment) {
+  std::string text = comment.empty() ? "" : fmt::format("# {}\n", comment);
+  text += "# timestamp tx ty tz qx qy qz qw\n";
   for (size_t i = 0; i < trajectory.size(); ++i) {
     const Rigid3 world_from_camera = trajectory[i].camera_from_world.inverse();
     const Eigen::Vector3d& t = world_from_camera.translation;

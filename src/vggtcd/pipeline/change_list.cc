@@ -92,23 +92,27 @@ std::string csv_line(const ChangeInstance& instance, size_t id, const Reconstruc
 
 void write_change_list(const std::filesystem::path& directory, const ChangeInstances& instances,
                        const Reconstruction& before, const Reconstruction& after,
-                       const ChangeSet& changes) {
-  Json json = {{"frame", "T2"},
-               {"unit", "u"},
+                       const ChangeSet& changes, const ResultFrame& frame) {
+  Json json = {{"frame", frame.name},
+               {"unit", frame.unit},
                {"scene_extent_u", changes.scene_extent_u},
                {"voxel_size_u", instances.voxel_size_u},
                {"changes", Json::array()}};
-  std::string csv =
-      "id,class,confidence,volume_u3,volume_sigma_u3,surface_u2,surface_sigma_u2,center_x_u,"
-      "center_y_u,center_z_u,size_1_u,size_2_u,size_3_u,pixels_before,pixels_after,"
-      "best_photo_before,best_photo_after\n";
+  std::string csv;
+  for (const char* column :
+       {"id", "class", "confidence", "volume_u3", "volume_sigma_u3", "surface_u2",
+        "surface_sigma_u2", "center_x_u", "center_y_u", "center_z_u", "size_1_u", "size_2_u",
+        "size_3_u", "pixels_before", "pixels_after", "best_photo_before", "best_photo_after"}) {
+    csv += (csv.empty() ? "" : ",") + frame.key(column);
+  }
+  csv += '\n';
   for (size_t i = 0; i < instances.instances.size(); ++i) {
     const ChangeInstance& instance = instances.instances[i];
     json["changes"].push_back(
         instance_json(instance, i + 1, before, after, changes.t1.changed + changes.t2.changed));
     csv += csv_line(instance, i + 1, before, after);
   }
-  write_json_file(directory / "changes.json", json);
+  write_json_file(directory / "changes.json", frame.renamed(json));
   write_text_file(directory / "changes.csv", csv);
 }
 

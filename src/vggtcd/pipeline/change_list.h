@@ -5,13 +5,13 @@
 #include <filesystem>
 
 #include "vggtcd/change/instances.h"
-#include "vggtcd/io/json_file.h"
+#include "vggtcd/pipeline/result_frame.h"
 
 namespace vggtcd {
 
 // Both files into an existing directory. Throws Error{kOutput}.
 void write_change_list(const std::filesystem::path& directory, const ChangeInstances& instances,
                        const Reconstruction& before, const Reconstruction& after,
-                       const ChangeSet& changes);
+                       const ChangeSet& changes, const ResultFrame& frame);
 
 }  // namespace vggtcd

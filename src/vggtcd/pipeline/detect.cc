@@ -11,6 +11,7 @@
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/pipeline/change_list.h"
 #include "vggtcd/pipeline/job_plan.h"
+#include "vggtcd/pipeline/result_frame.h"
 #include "vggtcd/pipeline/results.h"
 #include "vggtcd/registration/shared_intrinsics.h"
 #include "vggtcd/report/read_results.h"
@@ -80,6 +81,7 @@ Json inputs_json(const EpochInputs& inputs, const Epochs& epochs) {
     json["joint"]["keyframes_t2"] = epochs.joint->keyframes_t2;
   }
   if (inputs.initial_sim3) json["initial_sim3"] = inputs.initial_sim3->filename().string();
+  if (inputs.metric.reference) json["reference"] = inputs.metric.reference->filename().string();
   return json;
 }
 
@@ -124,6 +126,12 @@ void announce(const Epochs& epochs, const EpochInputs& inputs, const DetectOptio
       plan_detect(size, options, decides_by_votes(options, inputs.has_holes));
   stages.erase(stages.begin());  // reading is done
   progress.job_planned(stages);
+}
+
+std::optional<MetricProblem> metric_problem_of(const EpochInputs& inputs, const Epochs& epochs,
+                                               ProgressSink& progress) {
+  if (!inputs.metric.given()) return {};
+  return MetricProblem(inputs.metric, epochs.before, epochs.after, progress);
 }
 
 // The uncertainty of the registration where it is known: the mean over the axes of the
@@ -174,6 +182,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
 
   announce(epochs, inputs, options, progress);
   const std::optional<PixelQuestion> question = question_of(inputs, options, epochs);
+  const std::optional<MetricProblem> metres = metric_problem_of(inputs, epochs, progress);
 
   // 2. Align: coarse, fine.
   outcome.alignment = align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
@@ -215,22 +224,33 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   outcome.unobserved_t1 = changes.t1.unobserved;
   outcome.unobserved_t2 = changes.t2.unobserved;
 
-  // 4. Write.
+  // 4. From here on everything is in the frame and the unit of the results.
+  ResultFrame frame;
+  if (metres) {
+    outcome.metric =
+        metres->solve(epochs.before, epochs.after, t2_from_t1, changes.surface_sigma_u);
+    frame = ResultFrame(*outcome.metric);
+  }
+  express(frame, changes, answers ? &*answers : nullptr, instances, outcome.explanation);
+  const Sim3 result_from_t1 = frame.from_t2 * t2_from_t1;
+
+  // 5. Write.
   log.run("write results", [&](ProgressStage& stage) {
-    write_json_file(aside / "sim3.json", sim3_json(outcome.alignment));
-    write_cameras(aside, epochs.before, epochs.after, t2_from_t1);
+    write_json_file(aside / "sim3.json", sim3_json(outcome.alignment, outcome.metric));
+    write_cameras(aside, epochs.before, epochs.after, t2_from_t1, frame);
     const AnswerStore* voted = answers ? &*answers : nullptr;
-    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances, voted);
-    write_change_list(aside, instances, epochs.before, epochs.after, changes);
+    write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances, voted,
+                     frame);
+    write_change_list(aside, instances, epochs.before, epochs.after, changes, frame);
     if (outcome.explanation) {
-      write_json_file(aside / "explain.json", explanation_json(*outcome.explanation));
+      write_json_file(aside / "explain.json", explanation_json(*outcome.explanation, frame));
     }
     stage.advance(0.2);
-    write_change_ply(aside / "before_aligned.ply", epochs.before, t2_from_t1, changes.t1, changes,
-                     voted ? &voted->t1 : nullptr);
+    write_change_ply(aside / "before_aligned.ply", epochs.before, result_from_t1, changes.t1,
+                     changes, voted ? &voted->t1 : nullptr, frame);
     stage.advance(0.4);
-    write_change_ply(aside / "after.ply", epochs.after, {}, changes.t2, changes,
-                     voted ? &voted->t2 : nullptr);
+    write_change_ply(aside / "after.ply", epochs.after, frame.from_t2, changes.t2, changes,
+                     voted ? &voted->t2 : nullptr, frame);
     stage.advance(0.6);
     if (options.overlays) {
       write_overlays(aside / "overlays" / "before", epochs.before, changes.t1, changes);
@@ -240,11 +260,12 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   });
   summary["options"] = options_to_json(options);
   summary["alignment"] = alignment_json(outcome.alignment);
-  summary["change"] = change_json(changes);
+  if (outcome.metric) summary["metric"] = metric_json(*outcome.metric);
+  summary["change"] = change_json(changes, frame);
   summary["stages"] = stages_json(log);
   write_json_file(aside / "summary.json", summary);
 
-  // 5. Show: the page is made from the files above, as `vggt-cd view` makes it, so the two agree.
+  // 6. Show: the page is made from the files above, as `vggt-cd view` makes it, so the two agree.
   if (options.page) {
     epochs = {};
     changes = {};
@@ -260,17 +281,23 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   return outcome;
 }
 
-Alignment register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
-                          bool authors_layout, const std::filesystem::path& out,
-                          ProgressSink& progress) {
+RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
+                                bool authors_layout, const std::filesystem::path& out,
+                                ProgressSink& progress) {
   options.validate();
   OutputDirectory directory(out);
   StageLog log(progress);
   Epochs epochs = read_epochs(inputs, options, log);
   Json summary = summary_head("register", inputs, epochs);
-  const Alignment alignment = align(epochs.before, epochs.after, epochs.initial, options, log);
+  const std::optional<MetricProblem> metres = metric_problem_of(inputs, epochs, progress);
+  RegisterOutcome outcome{align(epochs.before, epochs.after, epochs.initial, options, log), {}};
+  const Alignment& alignment = outcome.alignment;
+  if (metres) {
+    outcome.metric = metres->solve(epochs.before, epochs.after, alignment.t2_from_t1, 0);
+    summary["metric"] = metric_json(*outcome.metric);
+  }
   log.run("write results", [&](ProgressStage&) {
-    write_json_file(directory.path() / "sim3.json", sim3_json(alignment));
+    write_json_file(directory.path() / "sim3.json", sim3_json(alignment, outcome.metric));
     if (authors_layout) {
       write_authors_layout(directory.path(), epochs.before, epochs.after, alignment, log);
     }
@@ -280,7 +307,7 @@ Alignment register_epochs(const EpochInputs& inputs, const AlignmentOptions& opt
   summary["stages"] = stages_json(log);
   write_json_file(directory.path() / "summary.json", summary);
   directory.commit();
-  return alignment;
+  return outcome;
 }
 
 }  // namespace vggtcd

@@ -9,6 +9,7 @@
 #include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/pipeline/alignment.h"
+#include "vggtcd/pipeline/metres.h"
 #include "vggtcd/report/report_page.h"
 
 namespace vggtcd {
@@ -23,6 +24,7 @@ struct EpochInputs {
   std::optional<std::filesystem::path> joint;         // the joint pass over keyframes of both
   std::optional<std::filesystem::path> initial_sim3;  // a sim3.json: t2_from_t1
   bool aligned = false;                               // both epochs are in one frame already
+  MetricInputs metric;                                // what is known in metres
   std::string before_name, after_name;                // what the user named, if not these files
   std::string origin;      // a sentence for the summary: how the files were made, if we made them
   bool has_holes = false;  // depth is missing where it was hard to find: a hole says nothing
@@ -80,14 +82,19 @@ struct DetectOutcome {
   int64_t unobserved_t1 = 0, unobserved_t2 = 0;  // of the points; known with free-space votes only
   int64_t removed = 0, added = 0, moved = 0;     // things
   std::optional<PixelExplanation> explanation;   // of the pixel that options.explain names
+  std::optional<Metric> metric;                  // if inputs.metric was given
 };
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress);
 
+struct RegisterOutcome {
+  Alignment alignment;
+  std::optional<Metric> metric;
+};
 // Alignment only: writes sim3.json and summary.json, and with authors_layout the files that the
 // authors' evaluator reads.
-Alignment register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
-                          bool authors_layout, const std::filesystem::path& out,
-                          ProgressSink& progress);
+RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOptions& options,
+                                bool authors_layout, const std::filesystem::path& out,
+                                ProgressSink& progress);
 
 }  // namespace vggtcd

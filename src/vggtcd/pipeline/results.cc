@@ -107,7 +107,7 @@ Trajectory trajectory_of(const std::vector<View>& views) {
 
 }  // namespace
 
-Json sim3_json(const Alignment& alignment) {
+Json sim3_json(const Alignment& alignment, const std::optional<Metric>& metric) {
   Json json = sim3_to_json(alignment.t2_from_t1);
   json["maps"] = "x_T2 = scale * rotation * x_T1 + translation";
   json["chosen"] = alignment.chosen;
@@ -118,6 +118,14 @@ Json sim3_json(const Alignment& alignment) {
   if (alignment.coarse) json["coarse"] = sim3_to_json(alignment.coarse->t2_from_t1);
   if (alignment.fine) json["fine"] = sim3_to_json(alignment.fine->t2_from_t1);
   if (alignment.robust) json["robust"] = sim3_to_json(alignment.robust->t2_from_t1);
+  if (metric) {
+    const MetricFrame& frame = metric->frame;
+    Json& into = json["metres_from_t2"] = sim3_to_json(frame.metres_from_t2);
+    into["frame"] = ResultFrame(*metric).name;
+    into["scale_sigma_relative"] = frame.scale_sigma ? Json(*frame.scale_sigma) : Json(nullptr);
+    into["rotation_sigma_deg"] = frame.rotation_sigma_rad * 180 / M_PI;
+    into["position_sigma_m"] = frame.position_sigma_m;
+  }
   return json;
 }
 
@@ -141,20 +149,23 @@ Json alignment_json(const Alignment& alignment) {
   return json;
 }
 
-Json change_json(const ChangeSet& changes) {
-  return {{"scene_extent_u", changes.scene_extent_u},
-          {"threshold_u", changes.threshold_u},
-          {"bound_u", changes.bound_u},
-          {"t1", epoch_change_json(changes.t1)},
-          {"t2", epoch_change_json(changes.t2)}};
+Json change_json(const ChangeSet& changes, const ResultFrame& frame) {
+  return frame.renamed({{"frame", frame.name},
+                        {"unit", frame.unit},
+                        {"scene_extent_u", changes.scene_extent_u},
+                        {"threshold_u", changes.threshold_u},
+                        {"bound_u", changes.bound_u},
+                        {"t1", epoch_change_json(changes.t1)},
+                        {"t2", epoch_change_json(changes.t2)}});
 }
 
-Json explanation_json(const PixelExplanation& why) {
+Json explanation_json(const PixelExplanation& why, const ResultFrame& frame) {
   const auto number = [](double value) { return std::isnan(value) ? Json(nullptr) : Json(value); };
   Json json = {{"photo", why.photo},
                {"frame", why.question.frame},
                {"pixel", {why.question.x, why.question.y}},
-               {"sentence", explanation_sentence(why)},
+               {"sentence", explanation_sentence(why, frame.unit_in_words())},
+               {"unit", frame.unit},
                {"label", enum_to_string(why.label)},
                {"voted_itself", why.voted},
                {"votes", why.votes},
@@ -180,7 +191,7 @@ Json explanation_json(const PixelExplanation& why) {
     }
     json["photos"].push_back(line);
   }
-  return json;
+  return frame.renamed(json);
 }
 
 Json stages_json(const StageLog& log) {
@@ -194,9 +205,11 @@ Json stages_json(const StageLog& log) {
 }
 
 void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
-                      const Sim3& t2_from_epoch, const EpochChange& change,
-                      const ChangeSet& changes, const StoredAnswers* answers) {
-  const std::string comments[] = {"frame: T2, model units"};
+                      const Sim3& result_from_epoch, const EpochChange& change,
+                      const ChangeSet& changes, const StoredAnswers* answers,
+                      const ResultFrame& in_frame) {
+  const std::string comments[] = {
+      fmt::format("frame: {}, unit: {}", in_frame.name, in_frame.unit_in_words())};
   std::vector<std::string> fields = {"change_distance", "changed", "confidence"};
   if (answers) fields.insert(fields.end(), {"label", "label_confidence", "level_of_detection"});
   const size_t num_fields = fields.size(), per_frame = epoch.pixels_per_frame();
@@ -204,7 +217,7 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
   std::vector<float> label_confidence(answers ? per_frame : 0);
   std::vector<float> level_of_detection(answers ? per_frame : 0);
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
-    const PixelRays rays(epoch.views[static_cast<size_t>(frame)], t2_from_epoch);
+    const PixelRays rays(epoch.views[static_cast<size_t>(frame)], result_from_epoch);
     const size_t first = static_cast<size_t>(frame) * per_frame;
     if (answers) {
       answers->confidence.read(first, label_confidence);
@@ -231,7 +244,8 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
 
 void write_change_npz(const std::filesystem::path& path, const Reconstruction& before,
                       const Reconstruction& after, const ChangeSet& changes,
-                      const ChangeInstances& instances, const AnswerStore* answers) {
+                      const ChangeInstances& instances, const AnswerStore* answers,
+                      const ResultFrame& frame) {
   struct Part {
     const char* suffix;
     std::vector<int64_t> shape;
@@ -279,6 +293,7 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
   for_parts("instance", [&](const std::string& key, const Part& part) {
     writer.add<int32_t>(key, part.shape, part.instance);
   });
+  writer.add_strings("unit", {&frame.unit, 1});
   writer.finish();
 }
 
@@ -301,22 +316,23 @@ void write_overlays(const std::filesystem::path& directory, const Reconstruction
   });
 }
 
-std::vector<View> views_in_t2(const Reconstruction& epoch, const Sim3& t2_from_epoch,
-                              const std::string& name_prefix) {
+std::vector<View> views_in(const Reconstruction& epoch, const Sim3& frame_from_epoch,
+                           const std::string& name_prefix) {
   std::vector<View> views = epoch.views;
   for (View& view : views) {
-    view.camera_from_world = camera_from_new_world(view.camera_from_world, t2_from_epoch);
+    view.camera_from_world = camera_from_new_world(view.camera_from_world, frame_from_epoch);
     view.name = name_prefix + view.name;
   }
   return views;
 }
 
 void write_cameras(const std::filesystem::path& directory, const Reconstruction& before,
-                   const Reconstruction& after, const Sim3& t2_from_t1) {
-  std::vector<View> views = views_in_t2(before, t2_from_t1, "before/");
-  const std::vector<View> views_t2 = views_in_t2(after, {}, "after/");
-  write_tum(directory / "cameras_before.tum", trajectory_of(views));
-  write_tum(directory / "cameras_after.tum", trajectory_of(views_t2));
+                   const Reconstruction& after, const Sim3& t2_from_t1, const ResultFrame& frame) {
+  std::vector<View> views = views_in(before, frame.from_t2 * t2_from_t1, "before/");
+  const std::vector<View> views_t2 = views_in(after, frame.from_t2, "after/");
+  const std::string comment = fmt::format("frame: {}, unit: {}", frame.name, frame.unit_in_words());
+  write_tum(directory / "cameras_before.tum", trajectory_of(views), comment);
+  write_tum(directory / "cameras_after.tum", trajectory_of(views_t2), comment);
   views.insert(views.end(), views_t2.begin(), views_t2.end());
   std::filesystem::create_directories(directory / "colmap");
   write_colmap_text(directory / "colmap", views);

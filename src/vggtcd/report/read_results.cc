@@ -29,6 +29,15 @@ double positive_member(const Json& json, std::string_view key, const fs::path& f
   return value.get<double>();
 }
 
+// "m", or "u" where nothing is said.
+std::string unit_of(const Json& change, const fs::path& file) {
+  const auto unit = change.find("unit");
+  if (unit == change.end() || *unit == "u") return "u";
+  if (*unit == "m") return "m";
+  throw_error(ErrorCode::kInput, "{}: change: unit: expected \"u\" or \"m\", found {}",
+              file.string(), unit->dump());
+}
+
 std::string input_name(const Json& summary, const char* epoch) {
   const Json::json_pointer path(fmt::format("/inputs/{}/file", epoch));
   return summary.contains(path) && summary[path].is_string() ? summary[path].get<std::string>()
@@ -162,9 +171,10 @@ ReportInput read_results(const fs::path& directory) {
     input.changes = json_member(read_json_file(list), "changes", list.string());
   }
   const Json& change = json_member(input.summary, "change", summary_path.string());
-  input.extent_u = positive_member(change, "scene_extent_u", summary_path);
-  input.threshold_u = positive_member(change, "threshold_u", summary_path);
-  input.bound_u = positive_member(change, "bound_u", summary_path);
+  input.unit = unit_of(change, summary_path);
+  input.extent_u = positive_member(change, "scene_extent_" + input.unit, summary_path);
+  input.threshold_u = positive_member(change, "threshold_" + input.unit, summary_path);
+  input.bound_u = positive_member(change, "bound_" + input.unit, summary_path);
   input.title = fmt::format("{} → {}", input_name(input.summary, "before"),
                             input_name(input.summary, "after"));
 

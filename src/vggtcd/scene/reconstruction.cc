@@ -1,10 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
-// Reconstruction: the promise of its sizes.
+// Reconstruction: frames by name, and the promise of its sizes.
 #include "vggtcd/scene/reconstruction.h"
+
+#include <charconv>
 
 #include "vggtcd/core/error.h"
 
 namespace vggtcd {
+
+std::optional<int> find_frame(const Reconstruction& reconstruction, std::string_view photo) {
+  for (int frame = 0; frame < reconstruction.num_frames(); ++frame) {
+    if (reconstruction.views[static_cast<size_t>(frame)].name == photo) return frame;
+  }
+  int number = 0;
+  const auto [end, error] = std::from_chars(photo.data(), photo.data() + photo.size(), number);
+  const bool is_number = error == std::errc{} && end == photo.data() + photo.size();
+  if (is_number && number >= 0 && number < reconstruction.num_frames()) return number;
+  return {};
+}
 
 void check_consistent(const Reconstruction& r) {
   check(r.height > 0 && r.width > 0, "reconstruction: positive frame size");

@@ -5,8 +5,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "vggtcd/geometry/pinhole.h"
@@ -57,6 +59,10 @@ struct JointReconstruction {
   std::vector<int> keyframes_t1;  // 0-based frame numbers in the before epoch
   std::vector<int> keyframes_t2;  // 0-based frame numbers in the after epoch
 };
+
+// The frame that shows the photo of this name; or, if no photo is called so, the frame of this
+// number from 0 (a name wins over a number: photos may be named 0, 1, 2 in another order).
+std::optional<int> find_frame(const Reconstruction& reconstruction, std::string_view photo);
 
 // Throws Error{kInternal} unless the arrays have the sizes that the header promises. For readers
 // and generators of reconstructions: what they hand over has passed this.

@@ -26,9 +26,10 @@ export interface Actions {
 const diagonal = (size: readonly number[]): number => Math.hypot(...size);
 
 function volumeOf(change: Change, unit: string): string {
-  if (change.volume_u3 === undefined) return '';
-  const sigma = change.volume_sigma_u3 === undefined ? '' : ` ± ${number(change.volume_sigma_u3, 1)}`;
-  return `${number(change.volume_u3, 2)}${sigma} ${unit}³`;
+  const volume = change.volume_m3 ?? change.volume_u3;
+  const deviation = change.volume_sigma_m3 ?? change.volume_sigma_u3;
+  if (volume === undefined) return '';
+  return `${number(volume, 2)}${deviation === undefined ? '' : ` ± ${number(deviation, 1)}`} ${unit}³`;
 }
 
 // The places of change: the result's own list if it has one, else groups of changed points.

@@ -23,7 +23,7 @@ export function makeLegend(report: Report, store: Store): HTMLElement {
         h('span', { class: kind, style: `left:${(at * 100).toFixed(1)}%` }, text);
       const u = (k: number): string => number(edgeValue(report, k));
       root.replaceChildren(
-        h('div', { class: 'legend-title' }, `Distance to the other epoch, ${report.unit}`),
+        h('div', { class: 'legend-title' }, `Distance to the other epoch, ${report.unit === 'u' ? 'scene units' : report.unit}`),
         h('div', { class: 'bar', style: `background:linear-gradient(90deg,${stops.join(',')})` },
           h('b', { style: `left:${share * 100}%` })),
         h('div', { class: 'ticks' }, share > 0.2 ? tick(0, '0') : null, tick(share, u(threshold), 'at'),

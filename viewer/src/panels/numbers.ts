@@ -80,16 +80,21 @@ function alignment(report: Report): HTMLElement {
   const coarse = asNumber(find(summary, 'median_residual_coarse_u', 'coarse_residual_u'));
   const fine = asNumber(find(summary, 'median_residual_fine_u', 'fine_residual_u'));
   const sigma = asNumber(find(summary, 'residual_sigma_u'));
+  // The alignment is computed before metres are known.
+  const metres = unit === 'm' ? asNumber(find(summary, 'metres_per_unit')) ?? 1 : 1;
+  const metric = find(summary.metric, 'sentence');
   const figure = (label: string, value: string, note = ''): HTMLElement =>
     h('div', { class: 'figure' }, h('span', {}, label), h('b', {}, value), h('small', {}, note));
-  const ofExtent = (value: number): string => `${percent(value / report.scene.extent)} of the extent`;
+  const residual = (label: string, value: number | null, digits: number): HTMLElement | null =>
+    value === null ? null : figure(label, `${number(value * metres, digits)} ${unit}`,
+      `${percent((value * metres) / report.scene.extent)} of the extent`);
   return card('Alignment', h('p', { class: 'sentence' }, verdictSentence(report)),
     h('div', { class: 'figures' },
       scale === null ? null : figure('Scale ratio', `× ${number(scale, 4)}`, 'after ÷ before'),
-      coarse === null ? null : figure('Coarse residual', `${number(coarse, 4)} ${unit}`, ofExtent(coarse)),
-      fine === null ? null : figure('Fine residual', `${number(fine, 4)} ${unit}`, ofExtent(fine)),
-      sigma === null ? null : figure('Robust residual, σ', `${number(sigma)} ${unit}`, ofExtent(sigma)),
+      residual('Coarse residual', coarse, 4), residual('Fine residual', fine, 4),
+      residual('Robust residual, σ', sigma, 3),
       figure('Extent of the scene', `${number(report.scene.extent)} ${unit}`)),
+    typeof metric === 'string' ? h('p', { class: 'muted' }, metric) : null,
     sim3 ? h('details', {}, h('summary', {}, 'The similarity transform'), table(sim3)) : null);
 }
 
