@@ -63,7 +63,8 @@ Json robust_json(const RobustResult& robust) {
                {"cost_initial", robust.cost_initial},
                {"cost_final", robust.cost_final},
                {"pivot_in_t2", vector_json(robust.pivot_in_t2)},
-               {"weak_directions", robust.weak_directions}};
+               {"open_degrees_of_freedom", robust.open_degrees_of_freedom},
+               {"open_motions", robust.open_motions}};
   for (size_t i = 0; i < kDegreesOfFreedom.size(); ++i) {
     const Eigen::Index k = static_cast<Eigen::Index>(i);
     json["degrees_of_freedom"][std::string(kDegreesOfFreedom[i])] = {

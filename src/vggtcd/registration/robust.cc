@@ -4,7 +4,6 @@
 #include "vggtcd/registration/robust.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -12,6 +11,7 @@
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
+#include "vggtcd/registration/constraints.h"
 #include "vggtcd/registration/frame_equations.h"
 #include "vggtcd/registration/surface_pairs.h"
 
@@ -20,7 +20,6 @@ namespace {
 
 // A step this small in standard deviations of the result ends the iteration.
 constexpr double kConvergedStep = 0.1;
-constexpr double kWeakShare = 0.5;
 // Residuals are never believed to be smaller than this share of the depth: on data without noise
 // the rounding of float positions would otherwise count as information.
 constexpr double kSigmaFloor = 1e-4;
@@ -59,49 +58,6 @@ Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& optio
     return false;
   });
   return rejected;
-}
-
-std::string describe_direction(const Vector7& direction) {
-  // The parameters are in units of their prior, so that their sizes compare.
-  const double rotation = direction.segment<3>(0).norm();
-  const double translation = direction.segment<3>(3).norm();
-  const double scale = std::abs(direction[6]);
-  const auto axis = [](Eigen::Vector3d v) {
-    v.normalize();
-    Eigen::Index largest = 0;
-    v.cwiseAbs().maxCoeff(&largest);
-    if (v[largest] < 0) v = -v;
-    return fmt::format("({:.2f}, {:.2f}, {:.2f})", v.x(), v.y(), v.z());
-  };
-  std::vector<std::string> parts;
-  constexpr double kNoticeable = 0.4;
-  if (rotation > kNoticeable) parts.push_back("rotation about " + axis(direction.segment<3>(0)));
-  if (translation > kNoticeable)
-    parts.push_back("translation along " + axis(direction.segment<3>(3)));
-  if (scale > kNoticeable) parts.push_back("scale");
-  return fmt::format("{}", fmt::join(parts, " with "));
-}
-
-// Covariance of the solution, and what of it the surfaces contribute: in coordinates in which the
-// prior is the identity, the variances left.
-void report_uncertainty(const Matrix7& surface_information, const Matrix7& prior_covariance,
-                        RobustResult& result) {
-  result.covariance = (surface_information + Matrix7(prior_covariance.inverse())).inverse();
-  result.constrained_share =
-      (Vector7::Ones() - result.covariance.diagonal().cwiseQuotient(prior_covariance.diagonal()))
-          .cwiseMax(0.0)
-          .cwiseMin(1.0);
-  const Vector7 sigma = prior_covariance.diagonal().cwiseSqrt();
-  const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix7> eigen(result.covariance,
-                                                                prior_covariance);
-  for (int i = 6; i >= 0; --i) {
-    if (1 - eigen.eigenvalues()[i] < kWeakShare) {
-      // A direction of the dual space; the motion it stands for is the prior's answer to it.
-      const Vector7 motion = prior_covariance * eigen.eigenvectors().col(i);
-      result.weak_directions.push_back(
-          describe_direction(motion.cwiseQuotient(sigma).normalized()));
-    }
-  }
 }
 
 double cost_of(const std::vector<SurfacePair>& all, double sigma_u, double min_normal_cosine) {
@@ -223,7 +179,13 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     current = small_similarity(step, result.pivot_in_t2) * current;
     result.converged = step.dot(information * step) < kConvergedStep * kConvergedStep;
   }
-  report_uncertainty(surface_information, prior_covariance, result);
+  const Constraints constraints =
+      constraints_of(without_normal_noise(surface_information, pairs, result.pivot_in_t2),
+                     prior_covariance, result.pivot_in_t2);
+  result.covariance = constraints.covariance;
+  result.constrained_share = constraints.constrained_share;
+  result.open_degrees_of_freedom = constraints.open_degrees_of_freedom;
+  result.open_motions = constraints.open_motions;
 
   const auto cost_at = [&](const Sim3& t2_from_t1) {
     matcher.pairs(t2_from_t1, true, pairs);
@@ -255,10 +217,10 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   result.explanation = fmt::format(
       "Refined rotation, translation and scale on {} static surface pairs; they fit to {:.3g}.",
       result.pairs, result.residual_sigma_u);
-  if (!result.weak_directions.empty()) {
-    result.explanation +=
-        fmt::format(" Not fixed by the static surfaces and kept near the initial alignment: {}.",
-                    fmt::join(result.weak_directions, "; "));
+  if (!result.open_motions.empty()) {
+    result.explanation += fmt::format(
+        " Held by the initial alignment only, not by static surfaces: {} (in the T2 frame).",
+        fmt::join(result.open_motions, "; "));
   }
   return result;
 }

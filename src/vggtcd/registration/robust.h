@@ -90,7 +90,9 @@ struct RobustResult {
   // surfaces (the rest is the initial similarity): one minus the ratio of variances. A plane leaves
   // two translations, a rotation and the scale near 0.
   Vector7 constrained_share = Vector7::Zero();
-  std::vector<std::string> weak_directions;  // in words, for shares below 0.5 in any combination
+  // What the surfaces leave to the initial similarity, in words (constraints.h).
+  int open_degrees_of_freedom = 0;
+  std::vector<std::string> open_motions;
 
   int iterations = 0;
   int64_t pairs = 0;  // static pairs in the last iteration, both directions

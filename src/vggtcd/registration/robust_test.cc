@@ -81,7 +81,7 @@ TEST(AlignRobust, SaysThatAPlaneLeavesFourDirectionsOpen) {
   const RobustResult result =
       align_robust(points_of(flat, 0), points_of(flat, 0.13), kError, {}, {});
   // Sliding in the plane (2), turning in it, and scaling within it.
-  EXPECT_EQ(result.weak_directions.size(), 4u);
+  EXPECT_EQ(result.open_degrees_of_freedom, 4);
   EXPECT_LT(result.constrained_share[3], 0.1);  // translation x
   EXPECT_GT(result.constrained_share[5], 0.9);  // translation z, across the plane
   // What the plane does not fix stays as it was given.
@@ -92,7 +92,7 @@ TEST(AlignRobust, SaysThatAPlaneLeavesFourDirectionsOpen) {
 
 TEST(AlignRobust, ConstrainsEverythingOnARelief) {
   const RobustResult result = align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, {}, {});
-  EXPECT_THAT(result.weak_directions, testing::IsEmpty());
+  EXPECT_THAT(result.open_motions, testing::IsEmpty());
   EXPECT_GT(result.constrained_share.minCoeff(), 0.5);
   EXPECT_GT(result.covariance.diagonal().minCoeff(), 0);
 }

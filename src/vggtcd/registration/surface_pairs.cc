@@ -28,7 +28,10 @@ void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
     const Eigen::Vector3d normal2 = t2_.normals[i2].cast<double>();
     pair.normal = search_from_t1 ? normal2 : normal1;
     pair.distance = (pair.moving - pair.fixed).norm();
-    pair.normal_cosine = std::abs(normal1.dot(normal2));
+    const double cosine = normal1.dot(normal2);
+    pair.normal_cosine = std::abs(cosine);
+    pair.own_normal =
+        ((cosine < 0 ? -1.0 : 1.0) * (search_from_t1 ? normal1 : normal2)).cast<float>();
     pair.frame_t1 = t1_.frames[i1];
     pair.frame_t2 = t2_.frames[i2];
     pair.from_t1 = search_from_t1;

@@ -21,7 +21,9 @@ struct SurfacePair {
   double distance = 0;       // between the points
   double normal_cosine = 0;  // |cos| between the two surfaces' normals
   double depth_u = 1;        // root mean square of the points' distances from their cameras
-  int32_t frame_t1 = 0;      // the photos the two points were taken from
+  // Of the searching surface, on the side of `normal`: its error is another one.
+  Eigen::Vector3f own_normal = Eigen::Vector3f::Zero();
+  int32_t frame_t1 = 0;  // the photos the two points were taken from
   int32_t frame_t2 = 0;
   bool from_t1 = true;  // the searching point is T1's
 
