@@ -470,7 +470,7 @@ class Explain(unittest.TestCase):
     def test_the_reasons_are_those_of_the_answer(self):
         for name, epoch, label, word in (("before", "t1", 1, "removed"), ("after", "t2", 2, "added"),
                                          ("before", "t1", 0, "unchanged"), ("after", "t2", 3, "unobserved")):
-            frame, x, y = self.pixel_with(epoch, label, 0.9)
+            frame, x, y = self.pixel_with(epoch, label, 0.6)
             out = self.root / word
             done = run(*self.inputs, "--explain", f"{x},{y},{name}/{frame}", "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -496,7 +496,7 @@ class Explain(unittest.TestCase):
 
     def test_in_metres_when_metres_are_known(self):
         out = self.root / "metres"
-        frame, x, y = self.pixel_with("t2", 2, 0.9)
+        frame, x, y = self.pixel_with("t2", 2, 0.6)
         done = run(*self.inputs, "--explain", f"{x},{y},after/{frame}", "--known-distance", "40,40,after/0",
                    "160,100,after/0", "3", "-o", out)
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -36,7 +36,7 @@ struct Scene {
             static_cast<int>(std::lround(uv.y()))};
   }
   FreeSpaceChange ask(const PixelQuestion& about, const FreeSpaceOptions& options = {}) const {
-    return free_space_changes(before, after, kT2FromT1, options, 0, silent_progress(), &about);
+    return free_space_changes(before, after, kT2FromT1, options, {}, silent_progress(), &about);
   }
 };
 

@@ -84,7 +84,7 @@ EpochFreeSpace answer_epoch(const Inquiry& inquiry, const VoteGrid& grid, Change
 
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
-                                   double registration_sigma_u, ProgressSink& progress,
+                                   const PointVariance& registration, ProgressSink& progress,
                                    const PixelQuestion* question, const PhotoAnswersSink& sink) {
   options.validate();
   ProgressStage stage(progress, "free-space change");
@@ -119,8 +119,7 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   result.surface_sigma_u = result.gap_sigma * t2_depth(after);
   stage.advance(0.2);
 
-  const VoteScale scale =
-      vote_scale(result.scene_extent_u, options.tolerance_sigmas, registration_sigma_u);
+  const VoteScale scale = vote_scale(result.scene_extent_u, options.tolerance_sigmas, registration);
   const double voxel_size = result.scene_extent_u / options.fusion_grid;
   const auto judge = [&](const Inquiry& inquiry, ChangeLabel changed,
                          const std::function<void(int, const PhotoAnswers&)>& answers) {

@@ -14,6 +14,7 @@
 #include "vggtcd/change/nearest_distance.h"
 #include "vggtcd/change/photo_answers.h"
 #include "vggtcd/core/progress.h"
+#include "vggtcd/geometry/point_variance.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
 
@@ -54,11 +55,12 @@ void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes);
 //   z - hi > t: X is hidden behind something, no vote;
 //   otherwise the photo sees X's surface, a vote against.
 // Near photos weigh more, as 1 / z. Votes are summed over the points of a voxel, so photos of one
-// epoch agree, and over the surface around a pixel. registration_sigma_u: see level_of_detection.
+// epoch agree, and over the surface around a pixel. registration: that of
+// t2_from_t1, see level_of_detection.
 // question: a pixel whose votes are kept in `explanation`.
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
-                                   double registration_sigma_u = 0,
+                                   const PointVariance& registration = {},
                                    ProgressSink& progress = silent_progress(),
                                    const PixelQuestion* question = nullptr,
                                    const PhotoAnswersSink& sink = {});

@@ -37,7 +37,7 @@ struct Answers {
   PhotoAnswers t1, t2;
 };
 Answers all_answers(const Reconstruction& before, const Reconstruction& after,
-                    double registration_sigma_u = 0) {
+                    const PointVariance& registration = {}) {
   Answers all{{}, PhotoAnswers(before.num_pixels()), PhotoAnswers(after.num_pixels())};
   const auto keep = [](PhotoAnswers& epoch) {
     return [&epoch](int frame, const PhotoAnswers& photo) {
@@ -48,8 +48,8 @@ Answers all_answers(const Reconstruction& before, const Reconstruction& after,
       for (const auto values : kValues) copy(photo.*values, epoch.*values);
     };
   };
-  all.change = free_space_changes(before, after, kT2FromT1, {}, registration_sigma_u,
-                                  silent_progress(), nullptr, {keep(all.t1), keep(all.t2)});
+  all.change = free_space_changes(before, after, kT2FromT1, {}, registration, silent_progress(),
+                                  nullptr, {keep(all.t1), keep(all.t2)});
   return all;
 }
 
@@ -167,7 +167,9 @@ TEST(FreeSpaceChanges, WhatIsKeptIsWhatThePhotosWereTold) {
 TEST(FreeSpaceChanges, TheLevelOfDetectionIsNeverBelowWhatTheRegistrationAllows) {
   const Reconstruction before = reconstruct(scene(flat_relief, 0), Sim3{});
   const Reconstruction after = reconstruct(scene(box_relief, 0.1), kT2FromT1);
-  const Answers change = all_answers(before, after, 0.01);
+  Eigen::Matrix<double, 7, 7> covariance = Eigen::Matrix<double, 7, 7>::Zero();
+  covariance.block<3, 3>(3, 3) = 0.01 * 0.01 * Eigen::Matrix3d::Identity();
+  const Answers change = all_answers(before, after, {covariance, Eigen::Vector3d::Zero()});
   int judged = 0;
   for (size_t i = 0; i < after.num_pixels(); ++i) {
     if (change.t2.label[i] == ChangeLabel::kUnobserved ||

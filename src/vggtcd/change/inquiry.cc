@@ -18,9 +18,10 @@ constexpr int kSigmaStride = 5;             // every 5th row and column is looke
 
 }  // namespace
 
-VoteScale vote_scale(double scene_extent_u, double tolerance_sigmas, double registration_sigma_u) {
+VoteScale vote_scale(double scene_extent_u, double tolerance_sigmas,
+                     const PointVariance& registration) {
   return {scene_extent_u / kGapSteps, static_cast<float>(kUnitWeight * scene_extent_u / 4),
-          static_cast<float>(tolerance_sigmas), registration_sigma_u};
+          static_cast<float>(tolerance_sigmas), registration};
 }
 
 Inquiry::Inquiry(const Reconstruction& judged, const Sim3& t2_from_judged,

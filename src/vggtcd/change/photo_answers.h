@@ -19,12 +19,13 @@ struct PhotoAnswers {
   // The mean gap in sigmas of the pairs, each held between -8 and 8: ranks best.
   std::vector<float> evidence;
   // The probability, 0 to 1, that the share of votes is on the side of its threshold that the label
-  // says, from the number of photos that voted and how they disagree.
+  // says, from the number of photos that voted and how they disagree. A half where the median of
+  // the labels around overruled the votes.
   std::vector<float> confidence;
-  // Smallest distance that is significant at 95 % here, T2 units: 1.96 sqrt(sigma^2 / n + r^2),
-  // sigma the spread of the gaps of both photos of a pair where nothing changed, n the photos that
-  // voted, r the uncertainty of the registration (M3C2: Lague et al. 2013, eq. 1, with one sigma
-  // for both epochs).
+  // Smallest distance that is significant at 95 % here, T2 units: 1.96 (sqrt(s1^2 / 1 + s2^2 / n) +
+  // r), s1^2 = s2^2 = sigma^2 / 2, sigma the spread of the gaps of a pair of photos where nothing
+  // changed, n the photos of the other epoch that voted, r the uncertainty of the registration here
+  // (M3C2: Lague et al. 2013, eq. 1).
   std::vector<float> level_of_detection;
 
   explicit PhotoAnswers(size_t pixels);

@@ -9,6 +9,7 @@
 
 #include "vggtcd/change/vote_grid.h"
 #include "vggtcd/change/witness.h"
+#include "vggtcd/geometry/point_variance.h"
 
 namespace vggtcd {
 
@@ -17,9 +18,10 @@ struct VoteScale {
   double gap_unit = 1;       // T2 units of a step
   float weight_steps_u = 1;  // weight of a vote times its depth, T2 units
   float tolerance_sigmas = 4;
-  double registration_sigma_u = 0;
+  PointVariance registration;
 };
-VoteScale vote_scale(double scene_extent_u, double tolerance_sigmas, double registration_sigma_u);
+VoteScale vote_scale(double scene_extent_u, double tolerance_sigmas,
+                     const PointVariance& registration);
 
 inline constexpr float kMaxEvidence = 8;      // sigmas; a vote can say no more
 inline constexpr float kEvidenceSteps = 256;  // fixed-point steps of a sigma

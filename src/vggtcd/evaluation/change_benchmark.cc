@@ -132,7 +132,7 @@ ChangeBenchmark benchmark_changes(const ChangeProblem& problem, const Sim3& t2_f
       std::ranges::copy(answers.evidence, rank.begin() + frame * std::ssize(answers.evidence));
     };
   };
-  decide_by_labels(free_space_changes(before, after, t2_from_t1, {}, 0, progress, nullptr,
+  decide_by_labels(free_space_changes(before, after, t2_from_t1, {}, {}, progress, nullptr,
                                       {keep_evidence(rank_t1), keep_evidence(rank_t2)}),
                    changes);
   score_all_ways(truth, answer_of(changes.t1, rank_t1), answer_of(changes.t2, rank_t2), "votes",

@@ -27,6 +27,8 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       result.coarse = align_coarse(before, after, *initial.joint, options.coarse);
     });
     result.initial_t2_from_t1 = result.coarse->t2_from_t1;
+    const InitialUncertainty measured = coarse_uncertainty(*result.coarse);
+    if (measured.similarity.covariance.trace() > 0) result.uncertainty = measured.similarity;
     result.chosen = result.verdict = "coarse";
     result.explanation = fmt::format(
         "Aligned through the joint pass over {} and {} keyframes; residuals {:.3g} and {:.3g} in "
@@ -72,6 +74,9 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       result.verdict = std::move(choice.verdict);
       result.explanation = std::move(choice.explanation);
       result.robust = std::move(choice.robust);
+      if (result.chosen == "robust") {
+        result.uncertainty = {result.robust->covariance, result.robust->pivot_in_t2};
+      }
       result.candidates = std::move(choice.candidates);
     });
   }

@@ -73,6 +73,9 @@ struct Alignment {
   std::optional<RobustResult> robust;          // with method robust
   std::vector<AlignmentCandidate> candidates;  // with method robust: what was compared
   std::string chosen;                          // "coarse", "fine", "robust" or "initial"
+  // Of t2_from_t1 where it is known: measured on the keyframes of the joint pass, and with method
+  // robust on the surfaces as well. The paper's translation update is not known to reduce it.
+  std::optional<SimilarityCovariance> uncertainty;
   std::string verdict;      // machine-readable: refined, kept_coarse_..., coarse, given
   std::string explanation;  // one sentence
   PlausibilityResult plausibility;

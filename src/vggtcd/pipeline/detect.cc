@@ -2,8 +2,6 @@
 // The whole job as numbered stages: two reconstructed epochs in, an aligned 3D change map out.
 #include "vggtcd/pipeline/detect.h"
 
-#include <cmath>
-
 #include "vggtcd/core/version.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/output_directory.h"
@@ -134,12 +132,9 @@ std::optional<MetricProblem> metric_problem_of(const EpochInputs& inputs, const 
   return MetricProblem(inputs.metric, epochs.before, epochs.after, progress);
 }
 
-// The uncertainty of the registration where it is known: the mean over the axes of the
-// translation's variance (of the pivot, near the middle of the scene); 0 if only the paper's stages
-// ran.
-double registration_sigma_u(const Alignment& alignment) {
-  if (!alignment.robust) return 0;
-  return std::sqrt(alignment.robust->covariance.block<3, 3>(3, 3).trace() / 3);
+PointVariance registration_variance(const Alignment& alignment) {
+  if (!alignment.uncertainty) return {};
+  return {alignment.uncertainty->covariance, alignment.uncertainty->pivot};
 }
 
 }  // namespace
@@ -202,7 +197,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
       FractionsOf fractions(stage);
       FreeSpaceChange votes =
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
-                             registration_sigma_u(outcome.alignment), fractions,
+                             registration_variance(outcome.alignment), fractions,
                              question ? &*question : nullptr, answers->sink());
       outcome.explanation = std::move(votes.explanation);
       decide_by_labels(std::move(votes), changes);

@@ -71,9 +71,20 @@ Json robust_json(const RobustResult& robust) {
         {"sigma", std::sqrt(robust.covariance(k, k))},
         {"constrained_share", robust.constrained_share[k]}};
   }
+  return json;
+}
+
+// Of the similarity that was chosen: standard deviations and the whole covariance about a pivot.
+Json uncertainty_json(const SimilarityCovariance& uncertainty) {
+  Json json = {{"pivot_in_t2", vector_json(uncertainty.pivot)}};
+  for (size_t i = 0; i < kDegreesOfFreedom.size(); ++i) {
+    const Eigen::Index k = static_cast<Eigen::Index>(i);
+    json["sigma"][std::string(kDegreesOfFreedom[i])] = std::sqrt(uncertainty.covariance(k, k));
+  }
   for (int row = 0; row < 7; ++row) {
     Json values = Json::array();
-    for (int column = 0; column < 7; ++column) values.push_back(robust.covariance(row, column));
+    for (int column = 0; column < 7; ++column)
+      values.push_back(uncertainty.covariance(row, column));
     json["covariance"].push_back(values);
   }
   return json;
@@ -141,6 +152,7 @@ Json alignment_json(const Alignment& alignment) {
     json["coarse"] = {{"t1", epoch_to_joint_json(alignment.coarse->t1)},
                       {"t2", epoch_to_joint_json(alignment.coarse->t2)}};
   }
+  if (alignment.uncertainty) json["uncertainty"] = uncertainty_json(*alignment.uncertainty);
   if (alignment.fine) json["fine"] = fine_json(*alignment.fine);
   if (alignment.robust) json["robust"] = robust_json(*alignment.robust);
   json["plausibility"] = plausibility_json(alignment.plausibility);
