@@ -50,7 +50,8 @@ void EpochArguments::add_to(CLI::App* command) {
       ->add_option("--known-distance", known_distances,
                    "Two pixels and the distance in metres of what they show, measured on site: "
                    "all results are in metres then. A and B are X,Y,before/PHOTO or "
-                   "X,Y,after/PHOTO, PHOTO a name or a number from 0; 0,0 is the top left pixel. "
+                   "X,Y,after/PHOTO, PHOTO a name or a number from 0; 0,0 is the top left pixel of "
+                   "the photo as it was analysed (its size is in summary.json). "
                    "Give it again for every distance that is known: the scale is their "
                    "least-squares fit, and how they disagree its standard error.")
       ->type_name("A B METRES")
