@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vggtcd/change/view_overlap.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/scene/point_cloud.h"
+#include "vggtcd/scene/view_overlap.h"
 
 namespace vggtcd {
 namespace {

@@ -31,6 +31,10 @@ class Inquiry {
   const std::vector<int>& views(int frame) const { return views_[static_cast<size_t>(frame)]; }
   bool asks(size_t pixel) const { return testifies(judged_, pixel, min_confidence_); }
 
+  // The rays of a photo's pixels, T2.
+  PixelRays rays(int frame) const {
+    return PixelRays(judged_.views[static_cast<size_t>(frame)], t2_from_judged_);
+  }
   // The point of a pixel with depth, T2.
   Eigen::Vector3f point(int frame, int u, int v) const {
     return point(rays(frame), correction_.photo(static_cast<size_t>(frame)), frame, u, v);
@@ -79,9 +83,6 @@ class Inquiry {
   }
 
  private:
-  PixelRays rays(int frame) const {
-    return PixelRays(judged_.views[static_cast<size_t>(frame)], t2_from_judged_);
-  }
   Eigen::Vector3f point(const PixelRays& rays_of_frame, const PhotoCorrection& correction,
                         int frame, int u, int v) const {
     const size_t in_frame =

@@ -3,6 +3,7 @@
 #include "vggtcd/cli/epoch_arguments.h"
 
 #include <fmt/format.h>
+
 #include <charconv>
 
 namespace vggtcd::cli {

@@ -95,6 +95,9 @@ struct FrameErrors {
   Rigid3 camera_from_warped;  // after the warp and the drift
 };
 
+// The waves of the warp, in extents.
+constexpr double kShortestWave = 1.5, kLongestWave = 4.5;
+
 // Sky gets depths: the network has no word for "nothing". Far, smooth and unsure.
 constexpr double kSkyDepthFactor = 2.0;
 
@@ -106,7 +109,8 @@ class PassSimulator {
         errors_(errors),
         key_(mix64(seed, draw)),
         pass_size_(pass_size(frames, errors)),
-        warp_(truth.extent_m, 3 * truth.extent_m, Random(key_, {kWarp})) {}
+        warp_(kShortestWave * truth.extent_m, kLongestWave * truth.extent_m,
+              Random(key_, {kWarp})) {}
 
   std::vector<FrameErrors> draw_frame_errors(const std::vector<FrameRef>& frames) const {
     std::vector<FrameErrors> result;

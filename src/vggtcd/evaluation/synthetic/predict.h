@@ -24,7 +24,7 @@ struct ErrorModel {
   double drift_translation = 0.002;
   double pose_depth_consistency = 0.7;
   double few_views = 3.0;
-  double two_states = 1.0;
+  double two_states = 2.0;
   double focal = 0.006;
   double edge_blur_px = 1.5;
   double confidence_noise = 0.35;
