@@ -208,7 +208,7 @@ class Weights(WithTinyNetwork):
         header["aggregator.camera_token"]["shape"] = [1, 2, 1, 129]
         self.write(bad, header, data)
         fails(["aggregator.camera_token"], bad.read_bytes())
-        self.assert_fails(INPUT, ["no_file"], "weights", "info", self.root / "no_file")
+        self.assert_fails(WEIGHTS, ["no_file"], "weights", "info", self.root / "no_file")
 
     def parts(self):
         content = self.weights.read_bytes()

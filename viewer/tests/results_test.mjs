@@ -99,7 +99,7 @@ test('what is no result is refused in one line', () => {
   for (const [args, code, part] of [
     [['view', work], 3, 'summary.json'],
     [['view', path.join(work, 'nowhere')], 3, 'nowhere'],
-    [['view', out, '--max-points', '-1'], 2, 'max_points'],
+    [['view', out, '--max-points', '-1'], 2, '--max-points'],
     [['view', out, '-o', path.join(work, 'no', 'such', 'page.html')], 6, 'page.html'],
   ]) {
     const { status: found, stderr } = status(...args);

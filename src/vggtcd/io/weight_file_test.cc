@@ -56,7 +56,7 @@ TEST(WeightFile, FailedDownloadsAreCalledWhatTheyAre) {
 }
 
 TEST(WeightFile, WhatCannotBeReadIsNamed) {
-  EXPECT_EQ(code_of("/no/such/file"), ErrorCode::kInput);
+  EXPECT_EQ(code_of("/no/such/file"), ErrorCode::kWeights);
   EXPECT_EQ(code_of(::testing::TempDir()), ErrorCode::kInput);
   const TemporaryDirectory directory;
   const std::string pipe = directory / "pipe";

@@ -20,6 +20,10 @@ void AlignmentOptions::validate() const {
 
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
+  AlignmentMethod method = options.method;
+  if (method == AlignmentMethod::kAuto) {
+    method = initial.own_joint_pass ? AlignmentMethod::kRobust : AlignmentMethod::kPaper;
+  }
   Alignment result;
   result.initial_source = initial.source;
   if (initial.joint) {
@@ -44,18 +48,18 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
   }
   result.t2_from_t1 = result.initial_t2_from_t1;
 
-  if (options.method != AlignmentMethod::kCoarse) {
+  if (method != AlignmentMethod::kCoarse) {
     log.run("fine alignment", [&](ProgressStage&) {
       result.fine = align_fine(before, after, result.initial_t2_from_t1, options.fine);
     });
   }
-  if (options.method == AlignmentMethod::kPaper || options.method == AlignmentMethod::kAuto) {
+  if (method == AlignmentMethod::kPaper) {
     result.t2_from_t1 = result.fine->t2_from_t1;
     if (result.fine->verdict == FineVerdict::kRefined) result.chosen = "fine";
     result.verdict = enum_to_string(result.fine->verdict);
     result.explanation = result.fine->explanation;
   }
-  if (options.method == AlignmentMethod::kRobust) {
+  if (method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
       std::optional<InitialUncertainty> uncertainty;
       AlignmentCandidate start{result.chosen, result.initial_t2_from_t1, 0};

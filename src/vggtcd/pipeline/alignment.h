@@ -20,7 +20,7 @@
 namespace vggtcd {
 
 enum class AlignmentMethod {
-  kAuto,    // the refinement that the benchmark shows to be best without a doubt: Algorithm 1
+  kAuto,    // robust after a joint pass that is an estimate of its own; else paper
   kCoarse,  // the initial similarity as it is
   kPaper,   // and Algorithm 1 on top of it
   kRobust   // the best of initial, Algorithm 1 and the robust Sim(3) refinement
@@ -37,10 +37,13 @@ struct AlignmentOptions {
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("method", self.method,
-          "auto: the paper's translation refinement with its residual self-check, and change by "
-          "free-space votes. paper: the same alignment, and change by nearest-neighbour distance, "
-          "all as in the paper. coarse: the joint pass alone, change as in paper. robust: all "
-          "seven parameters from the static surfaces, and change by free-space votes.");
+          "auto: robust after a network's joint pass; where the alignment is given, or both epochs "
+          "are parts of one model, the paper's refinement; change by free-space votes in either "
+          "case. robust: all seven parameters "
+          "from the static surfaces and what each photo shows, and change by free-space votes. "
+          "paper: the joint pass, the translation refinement with its residual self-check, and "
+          "change by nearest-neighbour distance, all as in the paper. coarse: the joint pass "
+          "alone, change as in paper.");
     field("shared_intrinsics", self.shared_intrinsics,
           "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
           "match, as "
@@ -62,6 +65,7 @@ struct InitialAlignment {
   Sim3 t2_from_t1;                             // it is given
   std::string source;                          // "joint pass", "aligned epochs", or a file name
   std::string remedy;                          // what to do if the epochs do not fit together
+  bool own_joint_pass = false;  // joint is an estimate of its own, not a part of one common model
 };
 
 struct Alignment {

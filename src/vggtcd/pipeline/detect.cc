@@ -48,7 +48,8 @@ Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, S
                           ? "is the joint file of these photos, T1's keyframes first, and are "
                             "keyframes_t1 and keyframes_t2 their frame numbers in that order?"
                           : "do both sets of photos show one place, and from places near enough to "
-                            "see the same surfaces?"};
+                            "see the same surfaces?",
+                      inputs.own_joint_pass};
   } else if (inputs.initial_sim3) {
     epochs.initial = {nullptr, read_sim3(*inputs.initial_sim3),
                       inputs.initial_sim3->filename().string(),
@@ -119,7 +120,7 @@ class FractionsOf : public ProgressSink {
 void announce(const Epochs& epochs, const EpochInputs& inputs, const DetectOptions& options,
               ProgressSink& progress) {
   const JobSize size{epochs.before.num_frames(), epochs.after.num_frames(), epochs.before.width,
-                     epochs.before.height};
+                     epochs.before.height, epochs.initial.own_joint_pass};
   std::vector<PlannedStage> stages =
       plan_detect(size, options, decides_by_votes(options, inputs.has_holes));
   stages.erase(stages.begin());  // reading is done

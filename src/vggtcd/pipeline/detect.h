@@ -26,8 +26,9 @@ struct EpochInputs {
   bool aligned = false;                               // both epochs are in one frame already
   MetricInputs metric;                                // what is known in metres
   std::string before_name, after_name;                // what the user named, if not these files
-  std::string origin;      // a sentence for the summary: how the files were made, if we made them
-  bool has_holes = false;  // depth is missing where it was hard to find: a hole says nothing
+  std::string origin;  // a sentence for the summary: how the files were made, if we made them
+  bool own_joint_pass = true;  // joint is an estimate of its own, not a part of one common model
+  bool has_holes = false;      // depth is missing where it was hard to find: a hole says nothing
 };
 
 enum class ChangeMethod {

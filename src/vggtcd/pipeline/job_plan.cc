@@ -15,6 +15,7 @@ namespace {
 // Microseconds per pixel of both epochs, measured on a Zen 5 server with 84 + 84 frames of
 // 518 x 392 px; those of stages that use all threads are of one thread.
 constexpr double kReadUs = 0.03, kCompareUs = 0.08, kAlignUs = 0.03, kRobustUs = 0.15;
+constexpr double kPlausibilityUs = 0.005;  // a sample of them
 constexpr double kVotesUs = 0.66, kThingsUs = 0.02;
 constexpr double kWriteUs = 0.12, kOverlaysUs = 0.2, kPageUs = 0.3;
 constexpr double kEveryStageS = 0.02;
@@ -33,9 +34,11 @@ std::vector<PlannedStage> plan_detect(const JobSize& size, const DetectOptions& 
   add("read predictions", kReadUs, false);
   add("coarse alignment", kAlignUs, true);
   add("fine alignment", kAlignUs, true);
-  if (options.alignment.method == AlignmentMethod::kRobust) {
+  if (options.alignment.method == AlignmentMethod::kRobust ||
+      (options.alignment.method == AlignmentMethod::kAuto && size.own_joint_pass)) {
     add("robust alignment", kRobustUs, true);
   }
+  add("plausibility", kPlausibilityUs, true);
   add("change detection", kCompareUs, true);
   if (votes) add("free-space votes", kVotesUs, true);
   add("changed things", kThingsUs, false);

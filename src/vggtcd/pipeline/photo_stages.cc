@@ -111,14 +111,17 @@ void remove_partial_files(const fs::path& folder) {
   for (const fs::path& path : partial) fs::remove(path);
 }
 
-JobSize job_size(const ReconstructionPlan& plan) {
-  return {plan.frames_before, plan.frames_after, plan.width, plan.height};
+JobSize job_size(const ReconstructionPlan& plan, const Reconstructor& reconstructor) {
+  return {plan.frames_before, plan.frames_after, plan.width, plan.height,
+          reconstructor.has_own_joint_pass()};
 }
 
-std::vector<PlannedStage> whole_job(const ReconstructionPlan& plan, const DetectOptions& options,
-                                    bool votes) {
+std::vector<PlannedStage> whole_job(const ReconstructionPlan& plan,
+                                    const Reconstructor& reconstructor,
+                                    const DetectOptions& options, bool votes) {
   std::vector<PlannedStage> stages = plan.stages;
-  const std::vector<PlannedStage> results = plan_detect(job_size(plan), options, votes);
+  const std::vector<PlannedStage> results =
+      plan_detect(job_size(plan, reconstructor), options, votes);
   stages.insert(stages.end(), results.begin(), results.end());
   return stages;
 }
@@ -166,19 +169,21 @@ std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& option
   const ReconstructionPlan plan = reconstructor->plan(photos);
   reconstructor->check_photos(photos, progress);
   const bool votes = decides_by_votes(options, reconstructor->leaves_holes());
-  const int64_t memory = std::max(plan.memory_bytes, detect_memory_bytes(job_size(plan), votes));
+  const int64_t memory =
+      std::max(plan.memory_bytes, detect_memory_bytes(job_size(plan, *reconstructor), votes));
   return fmt::format(
       "Reconstructor: {}\n"
       "Photos: {} before, {} after, {} in the joint reconstruction\n"
       "Frames: {} x {} px\n{}",
       plan.note, plan.frames_before, plan.frames_after, plan.frames_joint, plan.width, plan.height,
-      memory_and_time(memory, whole_job(plan, options, votes)));
+      memory_and_time(memory, whole_job(plan, *reconstructor, options, votes)));
 }
 
 std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options) {
   const PredictionSize before = prediction_size(inputs.before);
   const PredictionSize after = prediction_size(inputs.after);
-  const JobSize size{before.frames, after.frames, before.width, before.height};
+  const JobSize size{before.frames, after.frames, before.width, before.height,
+                     inputs.joint.has_value()};
   const bool votes = decides_by_votes(options, false);
   return fmt::format(
       "Predictions: {} frames before, {} after\n"
@@ -202,7 +207,7 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
   } else {
     fs::create_directories(kept);
     remove_partial_files(kept);
-    progress.job_planned(whole_job(reconstructor->plan(photos), options,
+    progress.job_planned(whole_job(reconstructor->plan(photos), *reconstructor, options,
                                    decides_by_votes(options, reconstructor->leaves_holes())));
     const std::string explanation = reconstructor->reconstruct(photos, kept, progress);
     // Written last: the stage is complete when it is there.
@@ -219,6 +224,7 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
       json_member(read_json_file(complete), "explanation", complete.string()).get<std::string>();
   done.inputs.origin = done.explanation;
   done.inputs.has_holes = reconstructor->leaves_holes();
+  done.inputs.own_joint_pass = reconstructor->has_own_joint_pass();
   return done;
 }
 

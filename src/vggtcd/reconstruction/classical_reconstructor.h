@@ -28,6 +28,7 @@ class ClassicalReconstructor : public Reconstructor {
   explicit ClassicalReconstructor(const ClassicalOptions& options) : options_(options) {}
   std::string name() const override { return "classical"; }
   bool leaves_holes() const override { return true; }
+  bool has_own_joint_pass() const override { return false; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
   void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const override;

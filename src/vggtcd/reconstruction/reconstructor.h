@@ -52,6 +52,8 @@ class Reconstructor {
   virtual std::string name() const = 0;  // "vggt", "classical"
   // Whether depth is missing where it was hard to find; a hole is unknown, never changed.
   virtual bool leaves_holes() const = 0;
+  // The joint reconstruction is another estimate, in another frame, than the epochs' own.
+  virtual bool has_own_joint_pass() const = 0;
   virtual std::string fingerprint() const = 0;  // all that its result depends on besides the photos
   // Reads no more than one photo.
   virtual ReconstructionPlan plan(const PhotoEpochs& photos) const = 0;

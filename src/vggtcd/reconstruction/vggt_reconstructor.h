@@ -22,6 +22,7 @@ class VggtReconstructor : public Reconstructor {
   explicit VggtReconstructor(VggtReconstructorOptions options) : options_(std::move(options)) {}
   std::string name() const override { return "vggt"; }
   bool leaves_holes() const override { return false; }
+  bool has_own_joint_pass() const override { return true; }
   std::string fingerprint() const override;
   ReconstructionPlan plan(const PhotoEpochs& photos) const override;
   void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const override;

@@ -26,6 +26,7 @@ class Surface {
   explicit Surface(unsigned seed, double normal_sigma_rad = 0.03)
       : random_(seed), noise_(0, normal_sigma_rad) {
     points_.voxel_size_u = 0.05;
+    points_.cameras.assign(12, {0, 0, 0});
   }
   void add(const Eigen::Vector3d& x, const Eigen::Vector3d& normal) {
     const Eigen::Vector3d tilt(noise_(random_), noise_(random_), noise_(random_));
