@@ -21,17 +21,14 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
   choice.verdict = enum_to_string(choice.robust.verdict);
   choice.explanation = choice.robust.explanation;
   choice.candidates = {initial};
-  const double sigma_u = choice.robust.residual_sigma_u;
   // Too little surface to compare anything on.
-  if (!(sigma_u > 0)) return choice;
-  choice.candidates[0].cost =
-      choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs
-          ? surface_cost(t1, t2, initial.t2_from_t1, sigma_u, options.min_normal_cosine)
-          : choice.robust.cost_initial;
+  if (!(choice.robust.relative_sigma > 0)) return choice;
+  choice.candidates[0].cost = choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs
+                                  ? surface_cost(t1, t2, initial.t2_from_t1, choice.robust, options)
+                                  : choice.robust.cost_initial;
   if (fine.verdict == FineVerdict::kRefined) {
     choice.candidates.push_back(
-        {"fine", fine.t2_from_t1,
-         surface_cost(t1, t2, fine.t2_from_t1, sigma_u, options.min_normal_cosine)});
+        {"fine", fine.t2_from_t1, surface_cost(t1, t2, fine.t2_from_t1, choice.robust, options)});
   }
   if (choice.robust.verdict == RobustVerdict::kRefined) {
     choice.candidates.push_back({"robust", choice.robust.t2_from_t1, choice.robust.cost_final});

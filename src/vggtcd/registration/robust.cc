@@ -60,7 +60,8 @@ Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& optio
   return rejected;
 }
 
-double cost_of(const std::vector<SurfacePair>& all, double sigma_u, double min_normal_cosine) {
+double cost_of(const std::vector<SurfacePair>& all, double relative_sigma,
+               double min_normal_cosine) {
   if (all.empty()) return 1;
   double sum = 0;
   // The nearest point may lie beside the surface rather than on it, by up to the voxel size; what
@@ -69,7 +70,7 @@ double cost_of(const std::vector<SurfacePair>& all, double sigma_u, double min_n
     const bool compatible = pair.normal_cosine >= min_normal_cosine;
     const double along = 0.25 * pair.distance;
     const double residual = std::max(std::abs(pair.plane_residual()), along);
-    sum += compatible ? tukey_loss(residual, sigma_u) : 1;
+    sum += compatible ? tukey_loss(residual, relative_sigma * pair.depth_u) : 1;
   }
   return sum / static_cast<double>(all.size());
 }
@@ -140,15 +141,12 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   const Matrix7 prior_covariance = result.uncertainty.similarity.about(result.pivot_in_t2);
   const Matrix7 prior_information = prior_covariance.inverse();
 
-  const SurfaceMatcher matcher(t1, t2);
+  const SurfaceMatcher matcher(t1, t2, options.relative_depth ? 0 : result.extent_u);
   std::vector<SurfacePair> pairs;
   Sim3 current = initial_t2_from_t1;
   Matrix7 surface_information = Matrix7::Zero();
   const auto find_static_pairs = [&] {
     matcher.pairs(current, options.both_directions, pairs);
-    if (!options.relative_depth) {
-      for (SurfacePair& pair : pairs) pair.depth_u = result.extent_u;
-    }
     return keep_static(pairs, options);
   };
   while (!result.converged && result.iterations < options.max_iterations) {
@@ -168,6 +166,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
         surface_equations(pairs, result.pivot_in_t2,
                           options.frame_errors ? &result.uncertainty.frame : nullptr, kSigmaFloor);
     result.residual_sigma_u = surface.sigma_u;
+    result.relative_sigma = surface.relative_sigma;
     surface_information = surface.information;
 
     // The prior's residual is what separates the current from the initial similarity.
@@ -189,7 +188,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
 
   const auto cost_at = [&](const Sim3& t2_from_t1) {
     matcher.pairs(t2_from_t1, true, pairs);
-    return cost_of(pairs, result.residual_sigma_u, options.min_normal_cosine);
+    return cost_of(pairs, result.relative_sigma, options.min_normal_cosine);
   };
   result.cost_initial = cost_at(initial_t2_from_t1);
   result.cost_final = cost_at(current);
@@ -226,9 +225,10 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
 }
 
 double surface_cost(const OrientedPoints& t1, const OrientedPoints& t2, const Sim3& t2_from_t1,
-                    double sigma_u, double min_normal_cosine) {
-  check(sigma_u > 0, "surface_cost: positive sigma");
-  return cost_of(SurfaceMatcher(t1, t2).pairs(t2_from_t1), sigma_u, min_normal_cosine);
+                    const RobustResult& scale, const RobustOptions& options) {
+  check(scale.relative_sigma > 0, "surface_cost: positive sigma");
+  const SurfaceMatcher matcher(t1, t2, options.relative_depth ? 0 : scale.extent_u);
+  return cost_of(matcher.pairs(t2_from_t1), scale.relative_sigma, options.min_normal_cosine);
 }
 
 }  // namespace vggtcd

@@ -98,6 +98,8 @@ struct RobustResult {
   int64_t pairs = 0;  // static pairs in the last iteration, both directions
   int64_t points_t1 = 0, points_t2 = 0;
   int64_t rejected_far = 0, rejected_normal = 0;
+  double relative_sigma =
+      0;  // the same per depth of the pair, which is what residuals are weighed by
   double residual_sigma_u = 0;     // robust standard deviation of the point-to-plane residuals
   InitialUncertainty uncertainty;  // what was assumed or measured beforehand
   bool uncertainty_measured = false;
@@ -115,9 +117,11 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           const std::optional<InitialUncertainty>& measured,
                           const RobustOptions& options);
 
-// What candidates are compared by: the mean over both directions of the Tukey loss (0 to 1) of the
-// point-to-plane distance at scale sigma_u; points without a compatible partner count 1.
+// What candidates are compared by, and what align_robust minimises but for the prior and the
+// photos' own errors: the mean over both directions of the Tukey loss (0 to 1) of the
+// point-to-plane distance at the scale that `scale` found; points without a compatible partner
+// count 1.
 double surface_cost(const OrientedPoints& t1, const OrientedPoints& t2, const Sim3& t2_from_t1,
-                    double sigma_u, double min_normal_cosine);
+                    const RobustResult& scale, const RobustOptions& options);
 
 }  // namespace vggtcd

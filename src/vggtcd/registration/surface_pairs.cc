@@ -8,8 +8,13 @@
 #include "vggtcd/registration/map_points.h"
 
 namespace vggtcd {
-SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2)
-    : t1_(t1), t2_(t2), index_t1_(t1.positions), index_t2_(t2.positions) {}
+SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2,
+                               double common_depth_u)
+    : t1_(t1),
+      t2_(t2),
+      common_depth_u_(common_depth_u),
+      index_t1_(t1.positions),
+      index_t2_(t2.positions) {}
 
 std::vector<SurfacePair> SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both) const {
   std::vector<SurfacePair> result;
@@ -35,10 +40,14 @@ void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
     pair.frame_t1 = t1_.frames[i1];
     pair.frame_t2 = t2_.frames[i2];
     pair.from_t1 = search_from_t1;
-    const Eigen::Vector3d camera1 = t2_from_t1 * t1_.cameras[static_cast<size_t>(pair.frame_t1)];
-    const Eigen::Vector3d& camera2 = t2_.cameras[static_cast<size_t>(pair.frame_t2)];
-    pair.depth_u = std::sqrt(
-        0.5 * ((pair.moving - camera1).squaredNorm() + (pair.fixed - camera2).squaredNorm()));
+    if (common_depth_u_ > 0) {
+      pair.depth_u = common_depth_u_;
+    } else {
+      const Eigen::Vector3d camera1 = t2_from_t1 * t1_.cameras[static_cast<size_t>(pair.frame_t1)];
+      const Eigen::Vector3d& camera2 = t2_.cameras[static_cast<size_t>(pair.frame_t2)];
+      pair.depth_u = std::sqrt(
+          0.5 * ((pair.moving - camera1).squaredNorm() + (pair.fixed - camera2).squaredNorm()));
+    }
     return pair;
   };
   constexpr int64_t kGrain = 1 << 13;

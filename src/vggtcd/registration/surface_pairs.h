@@ -32,8 +32,8 @@ struct SurfacePair {
 
 class SurfaceMatcher {
  public:
-  // The clouds must outlive the matcher.
-  SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2);
+  // The clouds must outlive the matcher. common_depth_u: the depth of every pair; 0: its own.
+  SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2, double common_depth_u = 0);
 
   // One pair per point of T1, then, with `both`, one per point of T2.
   std::vector<SurfacePair> pairs(const Sim3& t2_from_t1, bool both = true) const;
@@ -43,6 +43,7 @@ class SurfaceMatcher {
  private:
   const OrientedPoints& t1_;
   const OrientedPoints& t2_;
+  double common_depth_u_;
   NearestNeighborIndex index_t1_;  // in T1's own frame: it does not move
   NearestNeighborIndex index_t2_;
 };
