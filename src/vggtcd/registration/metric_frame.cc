@@ -78,8 +78,10 @@ MetricFrame metric_frame_from_cameras(std::span<const Eigen::Vector3d> centers_i
   double spread = 0;
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  // sum of [a]x^T [a]x
   for (size_t i = 0; i < centers_m.size(); ++i) {
-    frame.residuals_m.push_back((fit.y_from_x * centers_in_t2[i] - centers_m[i]).norm());
-    const Eigen::Vector3d arm = centers_m[i] - middle;
+    // The arms are those of the fitted cameras: the noise of measured ones would pass for width.
+    const Eigen::Vector3d fitted = fit.y_from_x * centers_in_t2[i];
+    frame.residuals_m.push_back((fitted - centers_m[i]).norm());
+    const Eigen::Vector3d arm = fitted - middle;
     spread += arm.squaredNorm();
     inertia += arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose();
   }
