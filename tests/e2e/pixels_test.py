@@ -4,6 +4,7 @@
 
 Usage: pixels_test.py PROGRAM TEST_MEDIA [unittest arguments]
 """
+import fcntl
 import json
 import os
 import pathlib
@@ -54,6 +55,28 @@ def content(out):
     return files
 
 
+def kill_at(arguments, wanted):
+    """Runs with --progress json and kills at the first event that is wanted; the events until then, and the status.
+
+    The events come through a pipe that holds one of them (a packet pipe of one page): the program waits in
+    the second event after the last one read here, so it cannot end before the kill, however fast it is.
+    """
+    events_in, events_out = os.pipe2(os.O_DIRECT | os.O_CLOEXEC)
+    fcntl.fcntl(events_out, fcntl.F_SETPIPE_SZ, 4096)
+    process = subprocess.Popen([*map(str, [PROGRAM, *arguments]), "--progress", "json"], stderr=events_out,
+                               stdout=subprocess.DEVNULL, env=ENVIRONMENT)
+    os.close(events_out)
+    events = []
+    with open(events_in, "rb") as lines:
+        for line in lines:
+            events.append(json.loads(line))
+            if wanted(events[-1]):
+                process.send_signal(signal.SIGKILL)
+                break
+        status = process.wait(timeout=100)  # before the pipe is closed: SIGPIPE would end it, too
+    return events, status
+
+
 @unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
 class Pixels(unittest.TestCase):
     @classmethod
@@ -88,20 +111,10 @@ class Pixels(unittest.TestCase):
 
     def kill_after(self, stage, out):
         """Starts, kills when the stage is reported finished; the stages that were finished by then."""
-        arguments = [PROGRAM, "detect", *self.photos, "-o", out, *SIZE, "--progress", "json"]
-        process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                                   text=True, env=ENVIRONMENT)
-        finished = []
-        for line in process.stderr:
-            event = json.loads(line)
-            if event["event"] == "stage_finished":
-                finished.append(event["stage"])
-                if event["stage"] == stage:
-                    process.send_signal(signal.SIGKILL)
-                    break
-        process.stderr.close()
-        self.assertEqual(process.wait(timeout=100), -signal.SIGKILL, stage)
-        return finished
+        events, status = kill_at(["detect", *self.photos, "-o", out, *SIZE],
+                                 lambda e: e["event"] == "stage_finished" and e["stage"] == stage)
+        self.assertEqual(status, -signal.SIGKILL, stage)
+        return [e["stage"] for e in events if e["event"] == "stage_finished"]
 
     def test_killed_after_every_stage_it_goes_on_to_the_same_bytes(self):
         out = self.root / "killed"
@@ -125,16 +138,9 @@ class Pixels(unittest.TestCase):
             out = self.root / ("within " + stage.replace(": ", " "))
             if stage in ("free-space votes", "write results"):  # what comes before is kept, and tested above
                 shutil.copytree(self.out, out)
-            arguments = [PROGRAM, "detect", *self.photos, "-o", out, *SIZE, "--progress", "json"]
-            process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE,
-                                       stdout=subprocess.DEVNULL, text=True, env=ENVIRONMENT)
-            for line in process.stderr:
-                event = json.loads(line)
-                if event["event"] == "stage_advanced" and event["stage"] == stage:
-                    process.send_signal(signal.SIGKILL)
-                    break
-            process.stderr.close()
-            self.assertEqual(process.wait(timeout=100), -signal.SIGKILL)
+            _, status = kill_at(["detect", *self.photos, "-o", out, *SIZE],
+                                lambda e, stage=stage: e["event"] == "stage_advanced" and e["stage"] == stage)
+            self.assertEqual(status, -signal.SIGKILL, stage)
             must("detect", *self.photos, "-o", out, *SIZE)
             self.assertEqual(content(out), content(self.out))
 

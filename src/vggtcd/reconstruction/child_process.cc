@@ -89,7 +89,8 @@ int run_program(const std::vector<std::string>& arguments, const std::filesystem
 
   constexpr int kPollsPerCall = 50;
   int status = 0;
-  for (int poll = 1;; ++poll) {
+  for (int poll = 0;; ++poll) {
+    if (while_running && poll % kPollsPerCall == 0) while_running();
     const pid_t ended = waitpid(child, &status, WNOHANG);
     if (ended == child || (ended < 0 && errno != EINTR)) break;
     if (interrupt_requested()) {
@@ -97,7 +98,6 @@ int run_program(const std::vector<std::string>& arguments, const std::filesystem
       waitpid(child, &status, 0);
       throw_if_interrupted();
     }
-    if (while_running && poll % kPollsPerCall == 0) while_running();
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);

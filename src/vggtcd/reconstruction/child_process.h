@@ -17,7 +17,7 @@ void require_program(const std::string& program, const std::string& remedy);
 // interface run without a display. Returns the exit status, or 128 + signal. Throws
 // Error{kUnavailable} ending in `remedy` if there is no such program, Error{kInterrupted} after
 // ending it when an interrupt was requested. The child also ends when this process does.
-// `while_running` is called about twice a second.
+// `while_running` is called once the program has started, and then about twice a second.
 int run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
                 const std::string& remedy, const std::function<void()>& while_running = {});
 

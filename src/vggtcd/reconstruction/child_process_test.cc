@@ -49,6 +49,12 @@ TEST(RunProgram, NamesAMissingProgramAndTheRemedy) {
   }
 }
 
+TEST(RunProgram, CallsBackEvenIfTheProgramEndsAtOnce) {
+  int calls = 0;
+  run_program({"true"}, fresh_log("run_program_short.log"), "", [&] { ++calls; });
+  EXPECT_GE(calls, 1);
+}
+
 TEST(RunProgram, EndsTheChildWhenInterrupted) {
   std::thread user([] {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
