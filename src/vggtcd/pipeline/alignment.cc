@@ -12,6 +12,11 @@ std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod) {
   return kNames;
 }
 
+AlignmentMethod resolve_method(AlignmentMethod method, bool own_joint_pass) {
+  if (method != AlignmentMethod::kAuto) return method;
+  return own_joint_pass ? AlignmentMethod::kRobust : AlignmentMethod::kPaper;
+}
+
 void AlignmentOptions::validate() const {
   coarse.validate();
   fine.validate();
@@ -20,19 +25,19 @@ void AlignmentOptions::validate() const {
 
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
-  AlignmentMethod method = options.method;
-  if (method == AlignmentMethod::kAuto) {
-    method = initial.own_joint_pass ? AlignmentMethod::kRobust : AlignmentMethod::kPaper;
-  }
+  const AlignmentMethod method = resolve_method(options.method, initial.own_joint_pass);
   Alignment result;
+  std::optional<InitialUncertainty> uncertainty;  // of the coarse stage
   result.initial_source = initial.source;
   if (initial.joint) {
     log.run("coarse alignment", [&](ProgressStage&) {
       result.coarse = align_coarse(before, after, *initial.joint, options.coarse);
     });
     result.initial_t2_from_t1 = result.coarse->t2_from_t1;
-    const InitialUncertainty measured = coarse_uncertainty(*result.coarse);
-    if (measured.similarity.covariance.trace() > 0) result.uncertainty = measured.similarity;
+    uncertainty = coarse_uncertainty(*result.coarse);
+    if (uncertainty->similarity.covariance.trace() > 0) {
+      result.uncertainty = uncertainty->similarity;
+    }
     result.chosen = result.verdict = "coarse";
     result.explanation = fmt::format(
         "Aligned through the joint pass over {} and {} keyframes; residuals {:.3g} and {:.3g} in "
@@ -61,15 +66,12 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
   }
   if (method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
-      std::optional<InitialUncertainty> uncertainty;
       AlignmentCandidate start{result.chosen, result.initial_t2_from_t1, 0};
       if (initial.joint && options.robust.relative_depth) {
         const CoarseResult by_depth = align_coarse(before, after, *initial.joint, options.coarse,
                                                    PairWeights::kInverseSquaredDepth);
         start = {"coarse_by_depth", by_depth.t2_from_t1, 0};
         uncertainty = coarse_uncertainty(by_depth);
-      } else if (result.coarse) {
-        uncertainty = coarse_uncertainty(*result.coarse);
       }
       AlignmentChoice choice =
           choose_alignment(before, after, start, uncertainty, *result.fine, options.robust);

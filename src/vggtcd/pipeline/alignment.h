@@ -27,6 +27,9 @@ enum class AlignmentMethod {
 };
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
 
+// What kAuto stands for; own_joint_pass as in InitialAlignment. Any other method is itself.
+AlignmentMethod resolve_method(AlignmentMethod method, bool own_joint_pass);
+
 struct AlignmentOptions {
   AlignmentMethod method = AlignmentMethod::kAuto;
   bool shared_intrinsics = false;
@@ -76,7 +79,9 @@ struct Alignment {
   std::optional<FineResult> fine;              // with methods paper and robust
   std::optional<RobustResult> robust;          // with method robust
   std::vector<AlignmentCandidate> candidates;  // with method robust: what was compared
-  std::string chosen;                          // "coarse", "fine", "robust" or "initial"
+  // "coarse", "fine", "initial" and, with method robust, "robust" or "coarse_by_depth" (the coarse
+  // stage with pairs weighed by 1 / depth^2, which that method starts from).
+  std::string chosen;
   // Of t2_from_t1 where it is known: measured on the keyframes of the joint pass, and with method
   // robust on the surfaces as well. The paper's translation update is not known to reduce it.
   std::optional<SimilarityCovariance> uncertainty;

@@ -34,8 +34,7 @@ std::vector<PlannedStage> plan_detect(const JobSize& size, const DetectOptions& 
   add("read predictions", kReadUs, false);
   add("coarse alignment", kAlignUs, true);
   add("fine alignment", kAlignUs, true);
-  if (options.alignment.method == AlignmentMethod::kRobust ||
-      (options.alignment.method == AlignmentMethod::kAuto && size.own_joint_pass)) {
+  if (resolve_method(options.alignment.method, size.own_joint_pass) == AlignmentMethod::kRobust) {
     add("robust alignment", kRobustUs, true);
   }
   add("plausibility", kPlausibilityUs, true);

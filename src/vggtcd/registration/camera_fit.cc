@@ -3,6 +3,7 @@
 #include "vggtcd/registration/camera_fit.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 namespace vggtcd {
 namespace {
@@ -12,7 +13,7 @@ constexpr double kBallShare = 0.5;      // radius of the ball around it, of the 
 
 // J^T J of the displacement of x by a small similarity about the pivot.
 Matrix7 information_at(const Eigen::Vector3d& x, const Eigen::Vector3d& pivot) {
-  const Eigen::Matrix<double, 3, 7> jacobian = pivot_change(x - pivot).block<3, 7>(3, 0);
+  const Matrix3x7 jacobian = point_jacobian(x - pivot);
   return jacobian.transpose() * jacobian;
 }
 

@@ -141,13 +141,8 @@ Matrix7 without_normal_noise(const Matrix7& surface_information,
   const size_t stride = pairs.size() / kMaxPairs + 1;
   for (size_t i = 0; i < pairs.size(); i += stride) {
     const Eigen::Vector3d arm = pairs[i].moving - pivot;
-    const auto jacobian = [&](const Eigen::Vector3d& normal) {
-      Vector7 j;
-      j << arm.cross(normal), normal, normal.dot(arm);
-      return j;
-    };
-    const Vector7 a = jacobian(pairs[i].normal);
-    const Vector7 b = jacobian(pairs[i].own_normal.cast<double>());
+    const Vector7 a = plane_jacobian(arm, pairs[i].normal);
+    const Vector7 b = plane_jacobian(arm, pairs[i].own_normal.cast<double>());
     apparent += 0.5 * (a * a.transpose() + b * b.transpose());
     common += 0.5 * (a * b.transpose() + b * a.transpose());
   }

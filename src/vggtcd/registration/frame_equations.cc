@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "vggtcd/core/parallel.h"
-#include "vggtcd/geometry/order_statistics.h"
 
 namespace vggtcd {
 namespace {
@@ -21,17 +20,6 @@ constexpr double kTukeyTuning = 4.685;    // 95 % efficiency under a normal dist
 constexpr double kPairShare = 0.5;        // found from both sides
 // Photos next to each other in the list err alike anyway; this bounds the linear system.
 constexpr int kMaxWitnesses = 48;
-
-double median_over(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
-  std::vector<float> values(pairs.size());
-  constexpr int64_t kGrain = 1 << 14;
-  parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      values[i] = static_cast<float>(value(pairs[i]));
-    }
-  });
-  return values.empty() ? 0 : static_cast<double>(median(values));
-}
 
 double relative_sigma_of(const std::vector<SurfacePair>& pairs, double min_relative_sigma) {
   const double mad = median_over(pairs, [](const SurfacePair& pair) {
@@ -102,9 +90,7 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
     const double sigma = relative_sigma * pair.depth_u;
     const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
     if (weight == 0) return;
-    const Eigen::Vector3d arm = pair.moving - pivot;
-    Vector7 jacobian;
-    jacobian << arm.cross(pair.normal), pair.normal, pair.normal.dot(arm);
+    const Vector7 jacobian = plane_jacobian(pair.moving - pivot, pair.normal);
     block.information += weight * jacobian * jacobian.transpose();
     block.gradient += weight * residual * jacobian;
     block.empty = false;

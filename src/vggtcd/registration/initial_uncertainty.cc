@@ -49,9 +49,7 @@ KeyframeWitness keyframe_witness(std::span<const Eigen::Vector3d> mapped,
   witness.center /= total;
   Vector7 right_side = Vector7::Zero();
   for (size_t i = 0; i < mapped.size(); ++i) {
-    const Eigen::Vector3d arm = mapped[i] - witness.center;
-    Eigen::Matrix<double, 3, 7> jacobian = Eigen::Matrix<double, 3, 7>::Zero();
-    jacobian.block<3, 7>(0, 0) = pivot_change(arm).block<3, 7>(3, 0);
+    const Matrix3x7 jacobian = point_jacobian(mapped[i] - witness.center);
     witness.information += weights[i] * jacobian.transpose() * jacobian;
     right_side += weights[i] * jacobian.transpose() * (targets[i] - mapped[i]);
   }

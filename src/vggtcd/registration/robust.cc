@@ -7,8 +7,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "vggtcd/core/parallel.h"
-#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
 #include "vggtcd/registration/constraints.h"
@@ -24,17 +22,6 @@ constexpr double kConvergedStep = 0.1;
 // the rounding of float positions would otherwise count as information.
 constexpr double kSigmaFloor = 1e-4;
 
-double median_of(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
-  std::vector<float> values(pairs.size());
-  constexpr int64_t kGrain = 1 << 14;
-  parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
-    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      values[i] = static_cast<float>(value(pairs[i]));
-    }
-  });
-  return values.empty() ? 0 : static_cast<double>(median(values));
-}
-
 struct Rejected {
   int64_t far = 0;
   int64_t normal = 0;
@@ -44,7 +31,7 @@ struct Rejected {
 // static pairs, in their order.
 Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& options) {
   const double limit = options.static_distance *
-                       median_of(pairs, [](const SurfacePair& pair) { return pair.distance; });
+                       median_over(pairs, [](const SurfacePair& pair) { return pair.distance; });
   Rejected rejected;
   std::erase_if(pairs, [&](const SurfacePair& pair) {
     if (pair.distance > limit) {
@@ -122,7 +109,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           const RobustOptions& options) {
   options.validate();
   RobustResult result;
-  result.t2_from_t1 = result.surface_t2_from_t1 = initial_t2_from_t1;
+  result.t2_from_t1 = initial_t2_from_t1;
   result.points_t1 = static_cast<int64_t>(t1.size());
   result.points_t2 = static_cast<int64_t>(t2.size());
   if (result.points_t1 + result.points_t2 < options.min_pairs || t1.size() == 0 || t2.size() == 0) {
@@ -145,13 +132,10 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   std::vector<SurfacePair> pairs;
   Sim3 current = initial_t2_from_t1;
   Matrix7 surface_information = Matrix7::Zero();
-  const auto find_static_pairs = [&] {
-    matcher.pairs(current, options.both_directions, pairs);
-    return keep_static(pairs, options);
-  };
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    const Rejected rejected = find_static_pairs();
+    matcher.pairs(current, options.both_directions, pairs);
+    const Rejected rejected = keep_static(pairs, options);
     result.pairs = static_cast<int64_t>(pairs.size());
     result.rejected_far = rejected.far;
     result.rejected_normal = rejected.normal;
@@ -201,9 +185,11 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     return result;
   }
   result.verdict = RobustVerdict::kRefined;
-  result.t2_from_t1 = result.surface_t2_from_t1 = current;
+  result.t2_from_t1 = current;
   if (options.camera_fit && options.frame_errors) {
-    find_static_pairs();
+    // The cost left the pairs at `current`, in both directions.
+    if (!options.both_directions) matcher.pairs(current, false, pairs);
+    keep_static(pairs, options);
     const PhotoErrors photos =
         photo_errors(pairs, result.pivot_in_t2, result.uncertainty.frame, kSigmaFloor);
     std::vector<Eigen::Vector3d> cameras_t1 = t1.cameras;

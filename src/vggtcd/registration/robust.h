@@ -76,8 +76,7 @@ enum class RobustVerdict {
 std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict);
 
 struct RobustResult {
-  Sim3 t2_from_t1;          // carries the cameras, if asked for (camera_fit)
-  Sim3 surface_t2_from_t1;  // fits the surfaces
+  Sim3 t2_from_t1;  // carries the cameras, if asked for (camera_fit); else fits the surfaces
   RobustVerdict verdict = RobustVerdict::kKeptInitialFewPairs;
   std::string explanation;
 
@@ -98,9 +97,9 @@ struct RobustResult {
   int64_t pairs = 0;  // static pairs in the last iteration, both directions
   int64_t points_t1 = 0, points_t2 = 0;
   int64_t rejected_far = 0, rejected_normal = 0;
-  double relative_sigma =
-      0;  // the same per depth of the pair, which is what residuals are weighed by
-  double residual_sigma_u = 0;     // robust standard deviation of the point-to-plane residuals
+  // Robust standard deviation of the point-to-plane residuals at the median depth, and per depth of
+  // the pair, which is what they are weighed by.
+  double residual_sigma_u = 0, relative_sigma = 0;
   InitialUncertainty uncertainty;  // what was assumed or measured beforehand
   bool uncertainty_measured = false;
   bool converged = false;  // the last step was below a tenth of a standard deviation

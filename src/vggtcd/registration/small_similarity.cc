@@ -2,7 +2,6 @@
 // Small similarities and their uncertainty: seven parameters about a pivot.
 #include "vggtcd/registration/small_similarity.h"
 
-#include <Eigen/Geometry>
 #include <cmath>
 
 namespace vggtcd {
@@ -28,12 +27,19 @@ Vector7 similarity_parameters(const Sim3& similarity, const Eigen::Vector3d& piv
 }
 
 Matrix7 pivot_change(const Eigen::Vector3d& to_minus_from) {
-  // The motion of the new pivot: t + w x d + s d, and w x d = -[d]x w.
-  const Eigen::Vector3d& d = to_minus_from;
   Matrix7 change = Matrix7::Identity();
-  change.block<3, 3>(3, 0) << 0, d.z(), -d.y(), -d.z(), 0, d.x(), d.y(), -d.x(), 0;
-  change.block<3, 1>(3, 6) = d;
+  change.block<3, 7>(3, 0) = point_jacobian(to_minus_from);  // the motion of the new pivot
   return change;
+}
+
+Matrix3x7 point_jacobian(const Eigen::Vector3d& arm) {
+  // w x d + t + s d, and w x d = -[d]x w.
+  const Eigen::Vector3d& d = arm;
+  Matrix3x7 jacobian;
+  jacobian.leftCols<3>() << 0, d.z(), -d.y(), -d.z(), 0, d.x(), d.y(), -d.x(), 0;
+  jacobian.middleCols<3>(3).setIdentity();
+  jacobian.col(6) = d;
+  return jacobian;
 }
 
 Matrix7 FrameSpread::covariance() const {

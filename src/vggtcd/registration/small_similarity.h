@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <string_view>
 
@@ -14,6 +15,7 @@ namespace vggtcd {
 // Order of the seven: w (rad, 3), t (units of the frame, 3), s.
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
+using Matrix3x7 = Eigen::Matrix<double, 3, 7>;
 
 inline constexpr std::array<std::string_view, 7> kDegreesOfFreedom = {
     "rotation_x",    "rotation_y",    "rotation_z", "translation_x",
@@ -26,6 +28,15 @@ Vector7 similarity_parameters(const Sim3& similarity, const Eigen::Vector3d& piv
 // First order: the parameters of one motion about two pivots, parameters_about_to = A *
 // parameters_about_from, where the pivots differ by to - from.
 Matrix7 pivot_change(const Eigen::Vector3d& to_minus_from);
+
+// First order: how a point moves by the seven parameters, where arm = point - pivot.
+Matrix3x7 point_jacobian(const Eigen::Vector3d& arm);
+// And how far along a normal: normal^T point_jacobian(arm).
+inline Vector7 plane_jacobian(const Eigen::Vector3d& arm, const Eigen::Vector3d& normal) {
+  Vector7 jacobian;
+  jacobian << arm.cross(normal), normal, normal.dot(arm);
+  return jacobian;
+}
 
 // How far a similarity may be off: covariance about a pivot, both in the target frame.
 struct SimilarityCovariance {

@@ -24,6 +24,22 @@ TEST(PivotChange, DescribesTheSameMotionAboutAnotherPoint) {
   EXPECT_GT((parameters - expected).norm(), 1e-5);
 }
 
+TEST(PointJacobian, IsTheDerivativeOfTheSimilarity) {
+  const Eigen::Vector3d pivot(1, -2, 3), point(-4, 5, 0.5), normal(0.6, 0, -0.8);
+  const Matrix3x7 jacobian = point_jacobian(point - pivot);
+  const Vector7 along_normal = plane_jacobian(point - pivot, normal);
+  constexpr double kStep = 1e-5;
+  for (int k = 0; k < 7; ++k) {
+    const Vector7 step = kStep * Vector7::Unit(k);
+    const Eigen::Vector3d derivative =
+        (small_similarity(step, pivot) * point - small_similarity(-step, pivot) * point) /
+        (2 * kStep);
+    // A central difference errs by the step squared, 1e-10, and rounding over the step, 1e-10.
+    EXPECT_LT((jacobian.col(k) - derivative).norm(), 1e-8) << kDegreesOfFreedom[size_t(k)];
+    EXPECT_NEAR(along_normal[k], normal.dot(derivative), 1e-8) << kDegreesOfFreedom[size_t(k)];
+  }
+}
+
 TEST(SimilarityCovariance, GrowsWithTheLeverArm) {
   SimilarityCovariance about_origin;
   about_origin.covariance.diagonal() << 0.01, 0.01, 0.01, 1e-6, 1e-6, 1e-6, 0.04;

@@ -5,9 +5,22 @@
 #include <cmath>
 
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/registration/map_points.h"
 
 namespace vggtcd {
+
+double median_over(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&)) {
+  std::vector<float> values(pairs.size());
+  constexpr int64_t kGrain = 1 << 14;
+  parallel_for(static_cast<int64_t>(pairs.size()), kGrain, [&](int64_t begin, int64_t end) {
+    for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      values[i] = static_cast<float>(value(pairs[i]));
+    }
+  });
+  return values.empty() ? 0 : static_cast<double>(median(values));
+}
+
 SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t2,
                                double common_depth_u)
     : t1_(t1),

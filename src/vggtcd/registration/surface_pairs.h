@@ -30,6 +30,9 @@ struct SurfacePair {
   double plane_residual() const { return normal.dot(moving - fixed); }
 };
 
+// The median of what `value` reads from each pair, as float; 0 without pairs.
+double median_over(const std::vector<SurfacePair>& pairs, double (*value)(const SurfacePair&));
+
 class SurfaceMatcher {
  public:
   // The clouds must outlive the matcher. common_depth_u: the depth of every pair; 0: its own.
