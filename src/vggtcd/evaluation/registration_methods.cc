@@ -21,9 +21,9 @@ Sim3 align_as_paper(const RegistrationProblem& problem) {
 Sim3 align_robustly(const RegistrationProblem& problem) {
   const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
   const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
-  return choose_alignment(problem.before, problem.after, {"coarse", coarse.t2_from_t1, 0},
-                          coarse_uncertainty(coarse), fine, {})
-      .t2_from_t1;
+  const RobustStart start =
+      start_from_joint(problem.before, problem.after, problem.joint, coarse, {}, {});
+  return choose_alignment(problem.before, problem.after, start, fine, {}).t2_from_t1;
 }
 
 RegistrationMethod rival(const std::string& name, std::string title) {

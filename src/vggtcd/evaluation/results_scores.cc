@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/synthetic/render.h"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr const char* kSuffix[] = {"_t1", "_t2"};
 constexpr const char* kFolder[] = {"before/", "after/"};
-constexpr uint8_t kUnobserved = 3;  // change.npz, docs/formats.md
+constexpr uint8_t kUnobserved = 3, kNoLabel = 255;  // change.npz, docs/formats.md
 
 std::vector<Rigid3> read_true_epoch(const NpzReader& reader, const std::string& key) {
   reader.expect_shape(key, std::array<int64_t, 3>{-1, 3, 4});
@@ -95,40 +96,62 @@ int64_t frame_pixel(const Maps& truth, const Maps& frame, size_t u, size_t v) {
   return static_cast<int64_t>(y) * static_cast<int64_t>(frame.width) + static_cast<int64_t>(x);
 }
 
-constexpr float kNoEvidence = -2, kNotObserved = -1;
+constexpr float kNoEvidence = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNotObserved = -std::numeric_limits<float>::infinity();
 
-// Rank of every pixel of the truth: above `called` exactly where the results say changed.
-struct Ranks {
-  std::vector<float> rank;
-  float called = 0;
+// What the results say about every pixel of the truth.
+struct Answers {
+  std::vector<float> rank;      // kNoEvidence, kNotObserved, or more for rather changed
+  std::vector<uint8_t> called;  // changed
 };
 
-Ranks rank_pixels(const NpzReader& change, const std::string& suffix, const ResultFrames& frames,
-                  const Maps& truth, float called) {
+// What the results say about the pixels of their own frames, whatever method made them.
+class Judgement {
+ public:
+  Judgement(const NpzReader& change, const std::string& suffix)
+      : changed_(change.read<uint8_t>("changed" + suffix)) {
+    const bool voted = change.has("label" + suffix);
+    if (voted) label_ = change.read<uint8_t>("label" + suffix);
+    rank_ = change.read<float>((voted ? "evidence" : "score") + suffix);
+    for (size_t i = 0; i < label_.size(); ++i) {
+      if (label_[i] == kNoLabel) {
+        rank_[i] = kNoEvidence;
+      } else if (label_[i] == kUnobserved || std::isnan(rank_[i])) {
+        rank_[i] = kNotObserved;
+      }
+    }
+  }
+  float rank(size_t i) const { return rank_[i]; }
+  bool changed(size_t i) const { return changed_[i] != 0; }
+
+ private:
+  std::vector<uint8_t> changed_, label_;
+  std::vector<float> rank_;
+};
+
+Answers answer_pixels(const NpzReader& change, const std::string& suffix,
+                      const ResultFrames& frames, const Maps& truth) {
   const Maps maps = maps_of(change, "score" + suffix);
   if (maps.frames != frames.poses.size()) {
     throw_error(ErrorCode::kInput, "{}: expected {} frames as in colmap/, found {}", change.name(),
                 frames.poses.size(), maps.frames);
   }
-  const std::vector<float> score = change.read<float>("score" + suffix);
-  const std::vector<uint8_t> changed = change.read<uint8_t>("changed" + suffix);
-  std::vector<uint8_t> label;
-  if (change.has("label" + suffix)) label = change.read<uint8_t>("label" + suffix);
-  Ranks ranks{std::vector<float>(truth.frames * truth.per_frame(), kNoEvidence), called};
+  const Judgement judgement(change, suffix);
+  const size_t pixels = truth.frames * truth.per_frame();
+  Answers answers{std::vector<float>(pixels, kNoEvidence), std::vector<uint8_t>(pixels, 0)};
   for (size_t k = 0; k < maps.frames; ++k) {
-    float* rank = ranks.rank.data() + static_cast<size_t>(frames.true_frame[k]) * truth.per_frame();
+    size_t to = static_cast<size_t>(frames.true_frame[k]) * truth.per_frame();
     for (size_t v = 0; v < truth.height; ++v) {
-      for (size_t u = 0; u < truth.width; ++u, ++rank) {
+      for (size_t u = 0; u < truth.width; ++u, ++to) {
         const int64_t pixel = frame_pixel(truth, maps, u, v);
         if (pixel < 0) continue;
-        const size_t i = k * maps.per_frame() + static_cast<size_t>(pixel);
-        if (std::isnan(score[i])) continue;
-        *rank = changed[i] ? called + 1 + score[i] : std::min(score[i], called);
-        if (!label.empty() && label[i] == kUnobserved) *rank = kNotObserved;
+        const size_t from = k * maps.per_frame() + static_cast<size_t>(pixel);
+        answers.rank[to] = judgement.rank(from);
+        answers.called[to] = judgement.changed(from) && !std::isnan(answers.rank[to]) ? 1 : 0;
       }
     }
   }
-  return ranks;
+  return answers;
 }
 
 std::string most_changed(const ResultFrames& frames, const std::vector<int64_t>& found) {
@@ -140,41 +163,31 @@ std::string most_changed(const ResultFrames& frames, const std::vector<int64_t>&
   return frames.names.at(best);
 }
 
-float largest_score(const NpzReader& change) {
-  float largest = 0;
-  for (const std::string suffix : kSuffix) {
-    for (const float score : change.read<float>("score" + suffix)) {
-      if (score > largest) largest = score;
-    }
-  }
-  return largest;
-}
-
 struct Counts {
   ScoredPixels evidence, every_pixel;
   int64_t seen = 0, unseen = 0, unseen_called = 0;
   std::vector<int64_t> found_in_frame;  // of the epoch that was counted last
 };
 
-void count(const NpzReader& truth, const std::string& suffix, const Ranks& ranks, const Maps& maps,
-           Counts& counts) {
+void count(const NpzReader& truth, const std::string& suffix, const Answers& answers,
+           const Maps& maps, Counts& counts) {
   counts.found_in_frame.assign(maps.frames, 0);
   const auto label = truth.read<uint8_t>("changed" + suffix);
   const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
   for (size_t pixel = 0; pixel < label.size(); ++pixel) {
     if (label[pixel] == kLabelVoid) continue;
-    const float rank = ranks.rank[pixel];
+    const float rank = answers.rank[pixel];
+    const bool evidence = !std::isnan(rank), called = answers.called[pixel] != 0;
     if (unseen[pixel]) {
-      if (label[pixel] != kLabelUnchanged || rank == kNoEvidence) continue;
+      if (label[pixel] != kLabelUnchanged || !evidence) continue;
       ++counts.unseen;
-      counts.unseen_called += rank > ranks.called ? 1 : 0;
+      counts.unseen_called += called ? 1 : 0;
       continue;
     }
     ++counts.seen;
     const bool changed = label[pixel] == kLabelChanged;
-    const bool called = rank > ranks.called;
-    counts.every_pixel.add(rank, called, changed);
-    if (rank != kNoEvidence) counts.evidence.add(rank, called, changed);
+    counts.every_pixel.add(evidence ? rank : kNotObserved, called, changed);
+    if (evidence) counts.evidence.add(rank, called, changed);
     if (changed && called) ++counts.found_in_frame[pixel / maps.per_frame()];
   }
 }
@@ -192,7 +205,6 @@ ResultsScores score_results(const std::filesystem::path& results,
   const NpzReader change(results / "change.npz");
   const Trajectory cameras = read_trajectory(results / "colmap", PoseConvention::kCameraFromWorld);
   const BitemporalTrajectory true_cameras = read_true_cameras(truth_npz);
-  const float called = largest_score(change);
   Counts counts;
   ResultsScores scores;
   BitemporalTrajectory found, expected;
@@ -206,7 +218,7 @@ ResultsScores score_results(const std::filesystem::path& results,
     for (const int k : frames.true_frame) {
       (e == 0 ? expected.t1 : expected.t2).push_back(true_poses[static_cast<size_t>(k)]);
     }
-    count(truth, suffix, rank_pixels(change, suffix, frames, maps, called), maps, counts);
+    count(truth, suffix, answer_pixels(change, suffix, frames, maps), maps, counts);
     (e == 0 ? scores.most_changed_t1 : scores.most_changed_t2) =
         most_changed(frames, counts.found_in_frame);
   }

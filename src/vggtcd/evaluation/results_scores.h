@@ -16,8 +16,9 @@ BitemporalTrajectory read_true_cameras(const std::filesystem::path& truth_npz);
 
 // Counted over the pixels of the truth, void ones left out. A pixel without evidence in the
 // results, because of its confidence or because its photo is not among them, is not called changed.
-// The ranking for average precision puts pixels that are called changed first, then goes by
-// distance; the decision is that of the results.
+// The decision is that of the results. The ranking for average precision goes by the distance, or
+// where photos voted by the gap in sigmas (evidence_* of change.npz): then every pixel that has a
+// label has evidence, and what nobody could see ranks last.
 struct ResultsScores {
   int frames_t1 = 0, frames_t2 = 0;            // of the results
   int true_frames_t1 = 0, true_frames_t2 = 0;  // of the truth

@@ -73,7 +73,13 @@ class Results : public ::testing::Test {
     };
     const std::vector<uint8_t> changed_t1 = called(t1), changed_t2 = called(t2);
     std::vector<uint8_t> label_t1(16, 0), label_t2(16, 0);
-    label_t2[5] = 3;  // the left pixel of the first photo
+    label_t2[5] = 3;     // the left pixel of the first photo
+    label_t1[15] = 255;  // the right one of the second
+    // Votes judge the pixel that has no distance, and rank by gaps, which may be negative.
+    std::vector<float> evidence_t1 = frame(6, -2), evidence_t2 = frame(kNan, -1);
+    const std::vector<float> evidence_second = frame(-3, kNan), evidence_fourth = frame(5, -4);
+    evidence_t1.insert(evidence_t1.end(), evidence_second.begin(), evidence_second.end());
+    evidence_t2.insert(evidence_t2.end(), evidence_fourth.begin(), evidence_fourth.end());
     NpzWriter change(results_ / "change.npz");
     change.add<float>("score_t1", {2, 2, 4}, t1);
     change.add<float>("score_t2", {2, 2, 4}, t2);
@@ -82,6 +88,8 @@ class Results : public ::testing::Test {
     if (with_labels) {
       change.add<uint8_t>("label_t1", {2, 2, 4}, label_t1);
       change.add<uint8_t>("label_t2", {2, 2, 4}, label_t2);
+      change.add<float>("evidence_t1", {2, 2, 4}, evidence_t1);
+      change.add<float>("evidence_t2", {2, 2, 4}, evidence_t2);
     }
     change.finish();
   }
@@ -114,15 +122,15 @@ TEST_F(Results, AreCountedPixelByPixelOfTheTruth) {
   EXPECT_DOUBLE_EQ(scores.unseen_called_changed, 0);
 }
 
-TEST_F(Results, WithLabelsWhatWasNotObservedRanksBelowEveryDistance) {
-  write_results(false);
-  const double without = score_results(results_, truth_).evidence.auprc;
+TEST_F(Results, OfVotesHaveEvidenceWhereThereIsALabelAndRankByTheGapInSigmas) {
   write_results(true);
   const ResultsScores scores = score_results(results_, truth_);
-  // Changed, but unobserved: it falls from before the unchanged pixels of distance 2 and 1 to the
-  // end. Right at ranks 1 and 3; then the last of 6.
-  EXPECT_DOUBLE_EQ(scores.evidence.auprc, (1.0 + 2.0 / 3 + 3.0 / 6) / 3);
-  EXPECT_LT(scores.evidence.auprc, without);
+  // Photo 0 (changed 6, unchanged -2), photo 2 (changed -3), after: (changed, not observed;
+  // unchanged -1), (changed 5, unchanged -4).
+  EXPECT_EQ(scores.every_pixel.pixels, 8);
+  EXPECT_EQ(scores.evidence.pixels, 7);
+  // Changed are the ranks 1, 2, 5 and 7 of 7.
+  EXPECT_DOUBLE_EQ(scores.evidence.auprc, (1.0 + 1.0 + 3.0 / 5 + 4.0 / 7) / 4);
 }
 
 TEST_F(Results, OfOtherPhotosAreRefused) {

@@ -27,17 +27,14 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
   const AlignmentMethod method = resolve_method(options.method, initial.own_joint_pass);
   Alignment result;
-  std::optional<InitialUncertainty> uncertainty;  // of the coarse stage
   result.initial_source = initial.source;
   if (initial.joint) {
     log.run("coarse alignment", [&](ProgressStage&) {
       result.coarse = align_coarse(before, after, *initial.joint, options.coarse);
     });
     result.initial_t2_from_t1 = result.coarse->t2_from_t1;
-    uncertainty = coarse_uncertainty(*result.coarse);
-    if (uncertainty->similarity.covariance.trace() > 0) {
-      result.uncertainty = uncertainty->similarity;
-    }
+    const SimilarityCovariance measured = coarse_uncertainty(*result.coarse).similarity;
+    if (measured.covariance.trace() > 0) result.uncertainty = measured;
     result.chosen = result.verdict = "coarse";
     result.explanation = fmt::format(
         "Aligned through the joint pass over {} and {} keyframes; residuals {:.3g} and {:.3g} in "
@@ -66,15 +63,12 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
   }
   if (method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
-      AlignmentCandidate start{result.chosen, result.initial_t2_from_t1, 0};
-      if (initial.joint && options.robust.relative_depth) {
-        const CoarseResult by_depth = align_coarse(before, after, *initial.joint, options.coarse,
-                                                   PairWeights::kInverseSquaredDepth);
-        start = {"coarse_by_depth", by_depth.t2_from_t1, 0};
-        uncertainty = coarse_uncertainty(by_depth);
+      RobustStart start{{result.chosen, result.initial_t2_from_t1, 0}, {}};
+      if (initial.joint) {
+        start = start_from_joint(before, after, *initial.joint, *result.coarse, options.coarse,
+                                 options.robust);
       }
-      AlignmentChoice choice =
-          choose_alignment(before, after, start, uncertainty, *result.fine, options.robust);
+      AlignmentChoice choice = choose_alignment(before, after, start, *result.fine, options.robust);
       result.t2_from_t1 = choice.t2_from_t1;
       result.chosen = std::move(choice.chosen);
       result.verdict = std::move(choice.verdict);

@@ -8,14 +8,24 @@
 
 namespace vggtcd {
 
+RobustStart start_from_joint(const Reconstruction& before, const Reconstruction& after,
+                             const JointReconstruction& joint, const CoarseResult& coarse,
+                             const CoarseOptions& coarse_options, const RobustOptions& options) {
+  if (!options.relative_depth)
+    return {{"coarse", coarse.t2_from_t1, 0}, coarse_uncertainty(coarse)};
+  const CoarseResult by_depth =
+      align_coarse(before, after, joint, coarse_options, PairWeights::kInverseSquaredDepth);
+  return {{"coarse_by_depth", by_depth.t2_from_t1, 0}, coarse_uncertainty(by_depth)};
+}
+
 AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruction& after,
-                                 const AlignmentCandidate& initial,
-                                 const std::optional<InitialUncertainty>& initial_uncertainty,
-                                 const FineResult& fine, const RobustOptions& options) {
+                                 const RobustStart& start, const FineResult& fine,
+                                 const RobustOptions& options) {
+  const AlignmentCandidate& initial = start.initial;
   const OrientedPoints t1 = oriented_points(before, options.robust_grid_resolution);
   const OrientedPoints t2 = oriented_points(after, options.robust_grid_resolution);
   AlignmentChoice choice;
-  choice.robust = align_robust(t1, t2, initial.t2_from_t1, initial_uncertainty, options);
+  choice.robust = align_robust(t1, t2, initial.t2_from_t1, start.uncertainty, options);
   choice.t2_from_t1 = initial.t2_from_t1;
   choice.chosen = initial.name;
   choice.verdict = enum_to_string(choice.robust.verdict);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vggtcd/geometry/sim3.h"
+#include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 #include "vggtcd/registration/robust.h"
 #include "vggtcd/scene/reconstruction.h"
@@ -29,12 +30,22 @@ struct AlignmentChoice {
   std::vector<AlignmentCandidate> candidates;  // what was compared; the smallest cost was chosen
 };
 
-// Refines all seven parameters from `initial` (its name is what it is called in the result) and
-// takes the candidate that fits best: `initial`, the fine stage's or the robust refinement's.
-// `initial_uncertainty` is the coarse stage's (coarse_uncertainty), if it ran.
+// Where the refinement starts, and how far that may be off if it was measured.
+struct RobustStart {
+  AlignmentCandidate initial;
+  std::optional<InitialUncertainty> uncertainty;
+};
+
+// After a joint pass, whose coarse stage found `coarse`: the same fit once more with pairs weighted
+// by 1 / depth^2 ("coarse_by_depth") where residuals are relative to depth, else `coarse` itself.
+RobustStart start_from_joint(const Reconstruction& before, const Reconstruction& after,
+                             const JointReconstruction& joint, const CoarseResult& coarse,
+                             const CoarseOptions& coarse_options, const RobustOptions& options);
+
+// Refines all seven parameters from the start and takes the candidate that fits best: the start
+// (its name is what it is called in the result), the fine stage's or the robust refinement's.
 AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruction& after,
-                                 const AlignmentCandidate& initial,
-                                 const std::optional<InitialUncertainty>& initial_uncertainty,
-                                 const FineResult& fine, const RobustOptions& options);
+                                 const RobustStart& start, const FineResult& fine,
+                                 const RobustOptions& options);
 
 }  // namespace vggtcd

@@ -37,7 +37,7 @@ TEST(ChooseAlignment, TakesTheSmallestCostAndLeavesAWrongStageBehind) {
   options.robust_grid_resolution = 100;
   // The epochs are in one frame: the truth is the identity. Algorithm 1 claims to be 0.5 off.
   const AlignmentChoice choice = choose_alignment(
-      epoch(0), epoch(0.1), {"coarse", shifted(0.03), 0}, {}, refined(shifted(0.5)), options);
+      epoch(0), epoch(0.1), {{"coarse", shifted(0.03), 0}, {}}, refined(shifted(0.5)), options);
   ASSERT_EQ(choice.candidates.size(), 3u);
   const auto best = std::min_element(
       choice.candidates.begin(), choice.candidates.end(),
@@ -52,7 +52,7 @@ TEST(ChooseAlignment, KeepsTheInitialOneWhereThereIsTooLittleSurface) {
   RobustOptions options;
   options.min_pairs = 1 << 30;
   const AlignmentChoice choice = choose_alignment(
-      epoch(0), epoch(0.1), {"initial", shifted(0.03), 0}, {}, refined(shifted(0)), options);
+      epoch(0), epoch(0.1), {{"initial", shifted(0.03), 0}, {}}, refined(shifted(0)), options);
   EXPECT_EQ(choice.chosen, "initial");
   EXPECT_EQ(choice.candidates.size(), 1u);
   EXPECT_EQ(choice.t2_from_t1.translation, shifted(0.03).translation);
