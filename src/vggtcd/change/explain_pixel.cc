@@ -38,9 +38,8 @@ PixelExplanation explain_pixel(const Inquiry& inquiry, const PixelQuestion& ques
                                const FreeSpaceOptions& options) {
   const Reconstruction& judged = inquiry.judged();
   const size_t i = static_cast<size_t>(question.frame);
-  const size_t in_frame = static_cast<size_t>(question.y) * static_cast<size_t>(judged.width) +
-                          static_cast<size_t>(question.x);
-  const size_t pixel = i * judged.pixels_per_frame() + in_frame;
+  const size_t pixel = pixel_index(question, judged);
+  const size_t in_frame = pixel % judged.pixels_per_frame();
   PixelExplanation why;
   why.question = question;
   why.photo = (question.in_after ? "after/" : "before/") + judged.views[i].name;

@@ -5,19 +5,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
+#include "vggtcd/core/number_text.h"
+
 namespace vggtcd {
 namespace {
-
-std::optional<int> whole_number(std::string_view text) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc{} || end != text.data() + text.size()) return {};
-  return value;
-}
 
 struct QuestionText {
   PixelQuestion question;  // but for the frame
@@ -30,8 +24,8 @@ QuestionText split_question(std::string_view text, std::string_view option) {
   std::optional<int> x, y;
   std::string_view epoch;
   if (first != text.npos && slash != text.npos) {
-    x = whole_number(text.substr(0, first));
-    y = whole_number(text.substr(first + 1, second - first - 1));
+    x = number_in<int>(text.substr(0, first));
+    y = number_in<int>(text.substr(first + 1, second - first - 1));
     epoch = text.substr(second + 1, slash - second - 1);
   }
   if (!x || !y || (epoch != "before" && epoch != "after")) {

@@ -20,6 +20,12 @@ struct PixelQuestion {
   int x = 0, y = 0;
 };
 
+// Its place in the pixels of its epoch [S, H, W].
+inline size_t pixel_index(const PixelQuestion& at, const Reconstruction& epoch) {
+  return static_cast<size_t>(at.frame) * epoch.pixels_per_frame() +
+         static_cast<size_t>(at.y) * static_cast<size_t>(epoch.width) + static_cast<size_t>(at.x);
+}
+
 // "X,Y,PHOTO", PHOTO one of before/NAME and after/NAME, or the photo's number from 0 instead of its
 // name. Throws Error{kUsage} naming the option if the text is not one, if there is no such photo,
 // or if the pixel lies outside it.

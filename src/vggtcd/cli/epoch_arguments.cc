@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
+#include "vggtcd/core/number_text.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -12,14 +12,13 @@ namespace {
 constexpr const char* kMetres = "Metres (one of the two)";
 
 double metres_of(const std::string& text) {
-  double metres = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), metres);
-  if (error != std::errc{} || end != text.data() + text.size()) {
+  const auto metres = number_in<double>(text);
+  if (!metres) {
     throw_error(ErrorCode::kUsage,
                 "--known-distance: expected A B METRES with a number of metres, found \"{}\"",
                 text);
   }
-  return metres;
+  return *metres;
 }
 
 }  // namespace

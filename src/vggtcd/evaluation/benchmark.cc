@@ -5,10 +5,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <iterator>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/evaluation/baselines/rivals.h"
 #include "vggtcd/evaluation/benchmark_summary.h"
 #include "vggtcd/evaluation/kept_rivals.h"
@@ -136,13 +136,12 @@ std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files
 
 std::vector<uint64_t> parse_seeds(const std::string& list) {
   const auto number = [&](const std::string& text) {
-    uint64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) {
+    const auto value = number_in<uint64_t>(text);
+    if (!value) {
       throw_error(ErrorCode::kUsage, "seeds: expected numbers such as 1,2,7 or 201-203, found '{}'",
                   list);
     }
-    return value;
+    return *value;
   };
   std::vector<uint64_t> seeds;
   for (size_t start = 0; start <= list.size();) {

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/evaluation/synthetic/render.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/trajectory.h"
@@ -31,12 +31,10 @@ std::vector<Rigid3> read_true_epoch(const NpzReader& reader, const std::string& 
   return poses;
 }
 
-// "before/0003.jpg" -> 3; nothing if the name is no number.
-int number_in(const std::string& name, const std::string& folder) {
+// "before/0003.jpg" -> 3; -1 if the name is no number.
+int frame_number(const std::string& name, const std::string& folder) {
   const std::string stem = std::filesystem::path(name.substr(folder.size())).stem().string();
-  int number = -1;
-  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
-  return error == std::errc() && end == stem.data() + stem.size() ? number : -1;
+  return number_in<int>(stem).value_or(-1);
 }
 
 // One epoch of the results: its cameras, and the true frame of each of its frames.
@@ -53,7 +51,7 @@ ResultFrames frames_of(const Trajectory& all, const std::string& folder, int tru
     if (!pose.name.starts_with(folder)) continue;
     frames.poses.push_back(pose.camera_from_world);
     frames.names.push_back(pose.name);
-    frames.true_frame.push_back(number_in(pose.name, folder));
+    frames.true_frame.push_back(frame_number(pose.name, folder));
   }
   if (frames.poses.empty()) {
     throw_error(ErrorCode::kInput, "{}: colmap/: expected cameras named {}..., found none",

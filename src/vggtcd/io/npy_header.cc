@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/io/npy.h"
 
@@ -120,12 +121,11 @@ void decode_type(NpyHeader& header) {
   const std::string_view descr = header.descr;
   if (descr == "O" || descr == "|O") header.kind = NpyKind::kObject;
   if (descr.size() < 3 || std::string_view("<>|=").find(descr[0]) == std::string_view::npos) return;
-  uint32_t count = 0;
-  const auto [end, error] = std::from_chars(descr.data() + 2, descr.data() + descr.size(), count);
-  if (error != std::errc() || end != descr.data() + descr.size()) return;
+  const auto count = number_in<uint32_t>(descr.substr(2));
+  if (!count) return;
 
   const auto one_of = [&](std::initializer_list<uint32_t> sizes) {
-    return std::find(sizes.begin(), sizes.end(), count) != sizes.end();
+    return std::find(sizes.begin(), sizes.end(), *count) != sizes.end();
   };
   switch (descr[1]) {
     case 'b':
@@ -153,7 +153,7 @@ void decode_type(NpyHeader& header) {
       break;
   }
   if (header.kind == NpyKind::kOther || header.kind == NpyKind::kObject) return;
-  header.item_size = header.kind == NpyKind::kUnicode ? size_t{4} * count : count;
+  header.item_size = header.kind == NpyKind::kUnicode ? size_t{4} * *count : *count;
   header.big_endian = descr[0] == '>' && header.item_size > 1;
 }
 

@@ -2,12 +2,12 @@
 // Reading PLY: the header decides the record, the file size must agree before memory is reserved.
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <sstream>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/io/ply.h"
 
 namespace vggtcd {
@@ -74,11 +74,11 @@ Header read_header(std::istream& file, const std::string& what) {
       after = after || vertices;
       vertices = type == "vertex";
       if (!vertices && !after) throw_not_ply(what, "an element " + type + " before the vertices");
-      if (vertices &&
-          (after || std::from_chars(name.data(), name.data() + name.size(), header.num_points).ec !=
-                        std::errc())) {
+      const auto count = number_in<int64_t>(name);
+      if (vertices && (after || !count)) {
         throw_not_ply(what, "a broken header line: " + line.substr(0, 80));
       }
+      if (vertices) header.num_points = *count;
     }
     if (keyword == "property" && vertices) {
       Property property{name};

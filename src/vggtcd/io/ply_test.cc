@@ -129,6 +129,7 @@ TEST(ReadPly, RefusesOtherAndDamagedFiles) {
   expect(start + "element vertex 2\n", "found a truncated header");
   expect(start + "end_header\n", "found no vertices with x, y and z");
   expect(start + "element vertex 2\nproperty float x\nend_header\n", "found no vertices");
+  expect(start + "element vertex 2x\n" + xyz, "found a broken header line: element vertex 2x");
   expect(start + "element vertex two\n" + xyz, "found a broken header line: element vertex two");
   expect(start + "element vertex 2\nproperty float x\n" + xyz, "found an unusable property");
   expect(start + "element vertex 2\nproperty list uchar int x\n" + xyz, "an unusable property");

@@ -3,12 +3,12 @@
 #include "vggtcd/io/reference_cameras.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <set>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/io/text_line.h"
 #include "vggtcd/io/trajectory.h"
@@ -19,9 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_number(std::string_view word) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size() && std::isfinite(value);
+  const auto value = number_in<double>(word);
+  return value && std::isfinite(*value);
 }
 
 size_t count_numbers(const TextLine& line) {

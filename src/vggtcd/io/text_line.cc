@@ -2,10 +2,10 @@
 // TextLine: splitting and numbers, independent of the locale.
 #include "vggtcd/io/text_line.h"
 
-#include <charconv>
 #include <cmath>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 
 namespace vggtcd {
 namespace {
@@ -38,20 +38,16 @@ std::string_view TextLine::rest(size_t i) const {
 
 double TextLine::number(size_t i) const {
   const std::string_view text = word(i);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    fail("a number", text);
-  }
-  return value;
+  const auto value = number_in<double>(text);
+  if (!value || !std::isfinite(*value)) fail("a number", text);
+  return *value;
 }
 
 int64_t TextLine::integer(size_t i) const {
   const std::string_view text = word(i);
-  int64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) fail("an integer", text);
-  return value;
+  const auto value = number_in<int64_t>(text);
+  if (!value) fail("an integer", text);
+  return *value;
 }
 
 Eigen::Quaterniond TextLine::unit_quaternion(const std::array<size_t, 4>& xyzw) const {

@@ -3,9 +3,9 @@
 #include "vggtcd/pipeline/metres.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/scene/point_cloud.h"
 
@@ -14,12 +14,6 @@ namespace {
 
 constexpr const char* kOption = "--known-distance";
 constexpr double kEdge = 0.05;  // relative range of depth around a pixel that is an edge
-
-uint32_t pixel_of(const PixelQuestion& at, const Reconstruction& epoch) {
-  return static_cast<uint32_t>(static_cast<size_t>(at.frame) * epoch.pixels_per_frame() +
-                               static_cast<size_t>(at.y) * static_cast<size_t>(epoch.width) +
-                               static_cast<size_t>(at.x));
-}
 
 // The largest over the smallest depth of the 3 x 3 pixels around, less one.
 double depth_range(const PixelQuestion& at, const Reconstruction& epoch) {
@@ -41,7 +35,7 @@ PixelQuestion place_of(const std::string& text, const Reconstruction& before,
                        const Reconstruction& after, ProgressSink& progress) {
   const PixelQuestion at = parse_pixel_question(text, before, after, kOption);
   const Reconstruction& epoch = at.in_after ? after : before;
-  if (!(epoch.depth[pixel_of(at, epoch)] > 0)) {
+  if (!(epoch.depth[pixel_index(at, epoch)] > 0)) {
     throw_error(ErrorCode::kUsage,
                 "{}: {} has no depth; choose a pixel on a surface that is seen well", kOption,
                 text);
@@ -60,7 +54,7 @@ Eigen::Vector3d point_in_t2(const PixelQuestion& at, const Reconstruction& befor
   const Reconstruction& epoch = at.in_after ? after : before;
   const PixelRays rays(epoch.views[static_cast<size_t>(at.frame)],
                        at.in_after ? Sim3{} : t2_from_t1);
-  return rays.point(at.x, at.y, epoch.depth[pixel_of(at, epoch)]).cast<double>();
+  return rays.point(at.x, at.y, epoch.depth[pixel_index(at, epoch)]).cast<double>();
 }
 
 // "images/before/a.jpg" -> "before/a.jpg"; "sub/a.jpg" -> "a.jpg"
@@ -74,11 +68,9 @@ std::string short_name(const std::string& name) {
 
 // A time stamp that is a whole number is the number of a photo of T2, whose frame this is.
 std::string photo_of_time_stamp(const std::string& name) {
-  double number = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-  const bool whole = error == std::errc{} && end == name.data() + name.size() &&
-                     number == std::floor(number) && number >= 0 && number < 1e9;
-  return whole ? fmt::format("after/{:.0f}", number) : name;
+  const auto number = number_in<double>(name);
+  const bool whole = number && *number == std::floor(*number) && *number >= 0 && *number < 1e9;
+  return whole ? fmt::format("after/{:.0f}", *number) : name;
 }
 
 }  // namespace

@@ -63,17 +63,18 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 
 }  // namespace
 
-void require_program(const std::string& program, const std::string& remedy) {
-  if (find_in_path(program).empty()) {
+std::string require_program(const std::string& program, const std::string& remedy) {
+  std::string file = find_in_path(program);
+  if (file.empty()) {
     throw_error(ErrorCode::kUnavailable, "{}: no such program in PATH; {}", program, remedy);
   }
+  return file;
 }
 
 int run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
                 const std::string& remedy, const std::function<void()>& while_running) {
   throw_if_interrupted();
-  require_program(arguments.at(0), remedy);
-  const std::string file = find_in_path(arguments[0]);
+  const std::string file = require_program(arguments.at(0), remedy);
   const int log_file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log_file < 0) throw_error(ErrorCode::kOutput, "{}: cannot be written", log.string());
   const std::vector<std::string> environment = offscreen_environment();

@@ -9,8 +9,8 @@
 
 namespace vggtcd {
 
-// Throws Error{kUnavailable} ending in `remedy` if there is no such program in PATH.
-void require_program(const std::string& program, const std::string& remedy);
+// The file that PATH leads to. Throws Error{kUnavailable} ending in `remedy` if there is none.
+std::string require_program(const std::string& program, const std::string& remedy);
 
 // Runs arguments[0], looked up in PATH, and waits for it. Standard output and error are appended to
 // `log`; standard input is empty; QT_QPA_PLATFORM=offscreen, so that programs with a user

@@ -2,9 +2,8 @@
 // Reconstruction: frames by name, and the promise of its sizes.
 #include "vggtcd/scene/reconstruction.h"
 
-#include <charconv>
-
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 
 namespace vggtcd {
 
@@ -12,10 +11,8 @@ std::optional<int> find_frame(const Reconstruction& reconstruction, std::string_
   for (int frame = 0; frame < reconstruction.num_frames(); ++frame) {
     if (reconstruction.views[static_cast<size_t>(frame)].name == photo) return frame;
   }
-  int number = 0;
-  const auto [end, error] = std::from_chars(photo.data(), photo.data() + photo.size(), number);
-  const bool is_number = error == std::errc{} && end == photo.data() + photo.size();
-  if (is_number && number >= 0 && number < reconstruction.num_frames()) return number;
+  const auto number = number_in<int>(photo);
+  if (number && *number >= 0 && *number < reconstruction.num_frames()) return number;
   return {};
 }
 
