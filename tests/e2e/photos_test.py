@@ -90,7 +90,7 @@ class BadInput(unittest.TestCase):
         self.temporary = tempfile.TemporaryDirectory()
         self.root = pathlib.Path(self.temporary.name)
         for epoch, first in (("before", 1), ("after", 11)):
-            for i in range(3):
+            for i in range(4):
                 write_photo(self.root / epoch / f"{i}.ppm", first + i)
 
     def tearDown(self):
@@ -105,26 +105,36 @@ class BadInput(unittest.TestCase):
         return lines[0]
 
     def test_identical_folders(self):
-        self.assertIn("the same 3 photos", self.refusal(status=3, after="before"))
+        self.assertIn("the same 4 photos", self.refusal(status=3, after="before"))
 
     def test_one_photo_a_side(self):
-        for name in ("1.ppm", "2.ppm"):
+        for name in ("1.ppm", "2.ppm", "3.ppm"):
             (self.root / "after" / name).unlink()
         self.assertIn("at least 2 different photos", self.refusal(status=3))
 
+    def test_one_frame_of_many(self):
+        self.assertIn("--frames: expected 0 (all photos) or at least 2, found 1", self.refusal("--frames", 1, status=2))
+
+    @unittest.skipUnless(shutil.which("colmap"), "no COLMAP")
+    def test_too_few_photos_for_the_classical_reconstruction_are_refused_before_any_work(self):
+        for name in ("2.ppm", "3.ppm"):
+            (self.root / "after" / name).unlink()
+        for arguments in ((), ("--dry-run",)):
+            self.assertIn("4 photos before and 2 after, at least 4 of each", self.refusal(*arguments, status=5))
+
     def test_duplicates_count_once(self):
-        for name in ("1.ppm", "2.ppm"):
+        for name in ("1.ppm", "2.ppm", "3.ppm"):
             shutil.copy(self.root / "after" / "0.ppm", self.root / "after" / name)
         self.assertIn("found 1", self.refusal(status=3))
 
     def test_portrait_mixed_with_landscape(self):
         write_photo(self.root / "after" / "3.ppm", 20, width=64, height=96)
-        self.assertIn("3.ppm is portrait", self.refusal(status=3))
+        self.assertIn("after/3.ppm is portrait", self.refusal(status=3))
 
     def test_nothing_in_common(self):
         if not shutil.which("colmap"):
             self.skipTest("no COLMAP")
-        self.assertIn("no two of the 6 photos", self.refusal(status=5))
+        self.assertIn("no two of the 8 photos", self.refusal(status=5))
 
     def write_epochs(self, photo):
         """photo(k) for a walk, every other one into the after epoch."""
@@ -156,7 +166,10 @@ class BadInput(unittest.TestCase):
 
     def test_missing_weights(self):
         self.assertIn("--reconstructor classical", self.refusal("--reconstructor", "vggt", status=4))
-        self.assertIn("no such file", self.refusal("--weights", self.root / "none.pt", status=4))
+        line = self.refusal("--weights", self.root / "none.pt", status=4)
+        self.assertIn("none.pt: expected network weights, found no such file; detect also works without", line)
+        line = self.refusal(status=4, env={"VGGTCD_WEIGHTS": "/nowhere.pt"})
+        self.assertIn("VGGTCD_WEIGHTS: /nowhere.pt: expected network weights", line)
 
     def test_missing_colmap(self):
         self.assertIn("install COLMAP", self.refusal(status=8, env={"PATH": str(self.root)}))
@@ -175,9 +188,9 @@ class BadInput(unittest.TestCase):
         self.assertIn("are these two sets of the same place, with overlapping views?", line)
 
     def prediction(self, name, **arrays):
-        poses = np.tile(np.eye(4)[:3], (3, 1, 1))
-        intrinsic = np.tile(np.array([[80.0, 0, 48], [0, 80, 32], [0, 0, 1]]), (3, 1, 1))
-        depth = np.ones((3, 64, 96), "f4")
+        poses = np.tile(np.eye(4)[:3], (4, 1, 1))
+        intrinsic = np.tile(np.array([[80.0, 0, 48], [0, 80, 32], [0, 0, 1]]), (4, 1, 1))
+        depth = np.ones((4, 64, 96), "f4")
         np.savez(self.root / name, extrinsic=poses, intrinsic=intrinsic, depth=depth, depth_conf=depth, **arrays)
 
     def test_a_prediction_without_images_on_one_side(self):
@@ -187,9 +200,9 @@ class BadInput(unittest.TestCase):
     def test_a_prediction_of_nothing_that_the_photos_show(self):
         if not shutil.which("colmap"):
             self.skipTest("no COLMAP")
-        noise = np.random.default_rng(1).integers(0, 256, (3, 64, 96, 3), "u1")
+        noise = np.random.default_rng(1).integers(0, 256, (4, 64, 96, 3), "u1")
         self.prediction("after.npz", images=noise)
-        self.assertIn("no two of the 6 photos", self.refusal(status=5, after="after.npz"))
+        self.assertIn("no two of the 8 photos", self.refusal(status=5, after="after.npz"))
 
     def test_a_photo_that_is_none_is_named(self):
         (self.root / "after" / "3.jpg").write_text("<html>404</html>")
@@ -209,7 +222,7 @@ class BadInput(unittest.TestCase):
     def test_a_dry_run_says_what_is_wrong_with_the_photos(self):
         write_photo(self.root / "after" / "3.ppm", 20, width=64, height=96)
         line = self.refusal("--dry-run", status=3)
-        self.assertIn("3.ppm is portrait and 0.ppm is landscape; expected photos of one orientation: turn", line)
+        self.assertIn("after/3.ppm is portrait and before/0.ppm is landscape; expected photos of one orientation: turn", line)
         (self.root / "after" / "3.ppm").write_bytes(b"P6 96 64 255\n")
         self.assertIn("3.ppm: not a readable photo", self.refusal("--dry-run", status=3))
         self.assertFalse((self.root / "out").exists())
@@ -237,14 +250,14 @@ class DryRun(unittest.TestCase):
         for i in range(24):
             write_photo(self.root / "all" / f"{i}.ppm", i + 1)
         after = self.root / "all"
-        for i in range(3):
+        for i in range(4):
             write_photo(self.root / "before" / f"{i}.ppm", 100 + i)
-        text, few = self.plan(self.root / "before", after, "--frames", "3")
-        self.assertIn("3 before, 3 after, 6 in the joint", text)
+        text, few = self.plan(self.root / "before", after, "--frames", "4")
+        self.assertIn("4 before, 4 after, 8 in the joint", text)
         self.assertIn("518 x 350 px", text)
         self.assertRegex(text, r"Memory: about \d+\.\d GB \(\d+\.\d GB available\)")
         text, many = self.plan(self.root / "before", after)
-        self.assertIn("3 before, 24 after, 8 in the joint", text)
+        self.assertIn("4 before, 24 after, 9 in the joint", text)
         self.assertGreater(many, 3 * few)
 
     def test_predictions_are_planned_from_their_headers(self):
@@ -271,7 +284,7 @@ class DryRun(unittest.TestCase):
         self.assertIn("5 before, 5 after", text)
 
     def test_heic_beside_ppm(self):
-        for i in range(2):
+        for i in range(4):
             write_photo(self.root / "before" / f"{i}.ppm", i + 1)
             write_photo(self.root / "other" / f"{i}.ppm", i + 11)
             made = subprocess.run([TEST_MEDIA, "heic", self.root / f"{i}.heic", self.root / "other" / f"{i}.ppm"])
@@ -279,7 +292,7 @@ class DryRun(unittest.TestCase):
                 self.skipTest("libheif or its encoder is not here")
             self.assertEqual(made.returncode, 0)
         text, _ = self.plan(self.root / "*.heic", self.root / "before")  # the first photo gives the size
-        self.assertIn("2 before, 2 after", text)
+        self.assertIn("4 before, 4 after", text)
         self.assertIn("518 x 350 px", text)
 
 

@@ -178,6 +178,8 @@ class Pixels(unittest.TestCase):
     def test_a_second_run_reconstructs_nothing(self):
         out = self.root / "twice"
         shutil.copytree(self.out, out)
+        plan = must("detect", *self.photos, "-o", out, *SIZE, "--dry-run").stdout
+        self.assertIn("Reconstructor: none: reconstruction of an earlier run is used again", plan)
         done = run("detect", *self.photos, "-o", out, *SIZE, "--progress", "plain")
         self.assertIn("used again", done.stderr)
         self.assertNotIn("matching", done.stderr)

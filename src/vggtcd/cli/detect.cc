@@ -38,7 +38,8 @@ void add_detect(Program& program) {
       arguments->photos.after = epochs.after;
       epochs.require_none();
       if (arguments->dry_run) {
-        fmt::print("{}", describe_plan(arguments->photos, arguments->options, progress));
+        fmt::print("{}",
+                   describe_plan(arguments->photos, arguments->options, epochs.out, progress));
         return;
       }
       photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);

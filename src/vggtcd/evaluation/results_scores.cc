@@ -10,8 +10,8 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
 #include "vggtcd/evaluation/synthetic/render.h"
+#include "vggtcd/io/colmap.h"
 #include "vggtcd/io/npz.h"
-#include "vggtcd/io/trajectory.h"
 
 namespace vggtcd {
 namespace {
@@ -44,14 +44,15 @@ struct ResultFrames {
   std::vector<int> true_frame;
 };
 
-ResultFrames frames_of(const Trajectory& all, const std::string& folder, int true_frames,
+// Image ids are in the order of the frames; names need not be (p10.jpg comes after p9.jpg).
+ResultFrames frames_of(const ColmapModel& model, const std::string& folder, int true_frames,
                        const std::filesystem::path& results) {
   ResultFrames frames;
-  for (const NamedPose& pose : all) {
-    if (!pose.name.starts_with(folder)) continue;
-    frames.poses.push_back(pose.camera_from_world);
-    frames.names.push_back(pose.name);
-    frames.true_frame.push_back(frame_number(pose.name, folder));
+  for (const auto& [id, image] : model.images) {
+    if (!image.name.starts_with(folder)) continue;
+    frames.poses.push_back(image.camera_from_world);
+    frames.names.push_back(image.name);
+    frames.true_frame.push_back(frame_number(image.name, folder));
   }
   if (frames.poses.empty()) {
     throw_error(ErrorCode::kInput, "{}: colmap/: expected cameras named {}..., found none",
@@ -201,7 +202,7 @@ ResultsScores score_results(const std::filesystem::path& results,
                             const std::filesystem::path& truth_npz) {
   const NpzReader truth(truth_npz);
   const NpzReader change(results / "change.npz");
-  const Trajectory cameras = read_trajectory(results / "colmap", PoseConvention::kCameraFromWorld);
+  const ColmapModel cameras = read_colmap(results / "colmap");
   const BitemporalTrajectory true_cameras = read_true_cameras(truth_npz);
   Counts counts;
   ResultsScores scores;

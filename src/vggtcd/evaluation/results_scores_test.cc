@@ -133,6 +133,25 @@ TEST_F(Results, OfVotesHaveEvidenceWhereThereIsALabelAndRankByTheGapInSigmas) {
   EXPECT_DOUBLE_EQ(scores.evidence.auprc, (1.0 + 1.0 + 3.0 / 5 + 4.0 / 7) / 4);
 }
 
+TEST_F(Results, BelongToPhotosInTheOrderOfTheFramesNotOfTheNames) {
+  write_results(false);
+  std::vector<View> views;
+  for (const auto& [name, k] : {std::pair("before/0002.jpg", 2),
+                                {"before/0000.jpg", 0},
+                                {"after/0000.jpg", 3},
+                                {"after/0001.jpg", 4}}) {
+    const auto& [x, y, z] = centers_[static_cast<size_t>(k)];
+    views.push_back(view_at(name, x, y, z));
+  }
+  write_colmap_text(results_ / "colmap", views);
+  const ResultsScores scores = score_results(results_, truth_);
+  EXPECT_NEAR(scores.cameras.ate_mean, 0, 1e-12);
+  // Now photo 0 has (changed 7, unchanged NaN) and photo 2 (changed 9; the other pixel is void).
+  EXPECT_EQ(scores.every_pixel.pixels, 8);
+  EXPECT_EQ(scores.evidence.pixels, 5);
+  EXPECT_EQ(scores.most_changed_t1, "before/0002.jpg");
+}
+
 TEST_F(Results, OfOtherPhotosAreRefused) {
   write_results(false);
   std::vector<View> views = {view_at("before/a.jpg", 0, 0, 0), view_at("before/b.jpg", 1, 0, 0),

@@ -65,7 +65,7 @@ bool is_complete_png(std::string_view file) {
 
 // Formats that a phone or a failed download leaves and that no decoder here knows.
 std::string_view why_not_an_image(std::string_view file) {
-  if (file.empty()) return "the file is empty";
+  if (file.empty()) return "the file is empty; copy it again";
   const std::string_view start = file.substr(0, 64);
   if (start.substr(std::min<size_t>(4, start.size())).starts_with("ftyp")) {
     return "a video, or a picture in a container that is not known; save it as JPEG or PNG";

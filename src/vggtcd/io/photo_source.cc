@@ -22,7 +22,8 @@ namespace fs = std::filesystem;
 const std::set<std::string> kPictures = {".jpg", ".jpeg", ".jpe",  ".png",  ".webp",
                                          ".tif", ".tiff", ".bmp",  ".dib",  ".ppm",
                                          ".pgm", ".jp2",  ".heic", ".heif", ".avif"};
-const std::set<std::string> kVideos = {".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg"};
+const std::set<std::string> kVideos = {".mp4",  ".mov", ".avi", ".mkv",  ".webm", ".m4v", ".mpg",
+                                       ".mpeg", ".3gp", ".mts", ".m2ts", ".wmv",  ".ogv"};
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -40,6 +41,7 @@ struct Listing {
   std::vector<fs::path> files;
   size_t others = 0;  // of a folder: visible files that are not pictures
   std::string an_other;
+  std::string a_folder;  // below a folder: one that is visible, without its pictures
 };
 
 // An empty pattern: the pictures.
@@ -48,7 +50,9 @@ Listing files_matching(const fs::path& folder, const std::string& pattern) {
   Listing found;
   for (const auto& entry : fs::directory_iterator(folder, failed)) {
     const std::string name = entry.path().filename().string();
-    if (name.front() == '.' || !entry.is_regular_file()) continue;
+    if (name.front() == '.') continue;
+    if (entry.is_directory()) found.a_folder = name;
+    if (!entry.is_regular_file()) continue;
     const bool wanted = pattern.empty() ? kPictures.count(ending_of(entry.path())) > 0
                                         : fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
     if (wanted) {
@@ -89,7 +93,23 @@ Listing list_files(const std::string& source) {
   if (!fs::exists(path)) {
     throw_error(ErrorCode::kInput, "{}: no such file or folder", source);
   }
-  return {{path}, 0, ""};
+  return {{path}, 0, "", ""};
+}
+
+// What there is instead of photos.
+std::string in_words(const Listing& found, const std::string& source) {
+  std::string words = found.others == 0 ? "none"
+                      : found.others == 1
+                          ? "only " + found.an_other
+                          : fmt::format("{} other files, such as {}", found.others, found.an_other);
+  if (kVideos.count(ending_of(found.an_other)) > 0) {
+    words +=
+        fmt::format("; name the video itself: {}", (fs::path(source) / found.an_other).string());
+  } else if (!found.a_folder.empty()) {
+    words += fmt::format("; photos of folders below are not taken: name the folder itself, {}",
+                         (fs::path(source) / found.a_folder).string());
+  }
+  return words;
 }
 
 // Removes a run of digits from the front and returns it without leading zeros.
@@ -183,7 +203,7 @@ std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOp
   }
   if (photos.empty()) {
     throw_error(ErrorCode::kInput, "{}: expected photos (jpg, png, heic, webp, tiff ...), found {}",
-                source, found.others == 0 ? "none" : fmt::format("{} other files", found.others));
+                source, in_words(found, source));
   }
   if (found.others > 0) {
     progress.notice(fmt::format("{}: {} files are not photos, such as {}", source, found.others,

@@ -115,7 +115,14 @@ TEST(FindPhotos, RefusesWhatHoldsNoPhotosNamingIt) {
   EXPECT_THAT(refusal(folder / "*.jpg"), HasSubstr("found none"));
   std::ofstream(folder / "broken.mp4") << "not a video";
   EXPECT_THAT(refusal(folder / "broken.mp4"), HasSubstr("broken.mp4"));
-  EXPECT_THAT(refusal(folder), HasSubstr("found 1 other files"));
+  EXPECT_THAT(refusal(folder), HasSubstr("found only broken.mp4; name the video itself: " +
+                                         (folder / "broken.mp4").string()));
+  std::filesystem::remove(folder / "broken.mp4");
+  std::ofstream(folder / "a.txt") << "no photo";
+  std::ofstream(folder / "b.txt") << "no photo";
+  EXPECT_THAT(refusal(folder), HasSubstr("found 2 other files, such as "));
+  std::filesystem::create_directory(folder / "walk");
+  EXPECT_THAT(refusal(folder), HasSubstr("name the folder itself, " + (folder / "walk").string()));
 }
 
 #ifdef VGGTCD_WITH_VIDEO

@@ -79,6 +79,9 @@ std::string stage_key(const PhotoEpochs& photos, const Reconstructor& reconstruc
   return fmt::format("{}-{:016x}", reconstructor.name(), fnv1a(all));
 }
 
+// Written last: the stage is complete when it is there.
+constexpr const char* kComplete = "reconstruction.json";
+
 // OUT holds nothing but what we may replace, so that .stages may live in it from now on.
 void claim(const fs::path& out) {
   { const OutputDirectory check(out, {kStages}); }
@@ -138,6 +141,8 @@ std::string memory_and_time(int64_t memory_bytes, const std::vector<PlannedStage
 }  // namespace
 
 PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress) {
+  check_field(inputs.frames == 0 || inputs.frames >= 2, "frames", inputs.frames,
+              "0 (all photos) or at least 2");
   const auto epoch = [&](const std::string& source) {
     return names_photos(source) ? photos_of(source, inputs.frames, progress)
                                 : prediction_of(source, progress);
@@ -163,11 +168,19 @@ PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress)
 }
 
 std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& options,
-                          ProgressSink& progress) {
+                          const fs::path& out, ProgressSink& progress) {
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
-  const ReconstructionPlan plan = reconstructor->plan(photos);
-  reconstructor->check_photos(photos, progress);
+  ReconstructionPlan plan = reconstructor->plan(photos);
+  const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
+  if (fs::exists(kept / kComplete)) {
+    plan.note =
+        fmt::format("none: reconstruction of an earlier run is used again ({})", kept.string());
+    plan.stages.clear();
+    plan.memory_bytes = 0;
+  } else {
+    reconstructor->check_photos(photos, progress);
+  }
   const bool votes = decides_by_votes(options, reconstructor->leaves_holes());
   const int64_t memory =
       std::max(plan.memory_bytes, detect_memory_bytes(job_size(plan, *reconstructor), votes));
@@ -200,7 +213,7 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
   ReconstructedPhotos done;
   done.lock = lock_stages(out);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
-  const fs::path complete = kept / "reconstruction.json";
+  const fs::path complete = kept / kComplete;
   if (fs::exists(complete)) {
     progress.notice(
         fmt::format("reconstruction of an earlier run is used again ({})", kept.string()));
@@ -210,7 +223,6 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
     progress.job_planned(whole_job(reconstructor->plan(photos), *reconstructor, options,
                                    decides_by_votes(options, reconstructor->leaves_holes())));
     const std::string explanation = reconstructor->reconstruct(photos, kept, progress);
-    // Written last: the stage is complete when it is there.
     write_json_file(complete,
                     Json{{"reconstructor", reconstructor->name()}, {"explanation", explanation}});
   }

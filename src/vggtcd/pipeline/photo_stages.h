@@ -18,15 +18,16 @@ struct PhotoInputs {
   ReconstructorOptions reconstruction;
 };
 
-// The photos of both epochs; of a prediction file its images, and itself. Throws Error{kInput} for
-// fewer than two photos on a side, for two sides with the same photos, and for a prediction file
-// without images.
+// The photos of both epochs; of a prediction file its images, and itself. Throws Error{kUsage} for
+// `frames` of 1, Error{kInput} for fewer than two photos on a side, for two sides with the same
+// photos, and for a prediction file without images.
 PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress);
 
-// The plan of the whole job, in words, for --dry-run. Reads all photos and throws what the job
-// would throw for those that cannot be read or do not go together.
+// The plan of the whole job, in words, for --dry-run; a reconstruction that OUT/.stages keeps is
+// not planned again. Reads all photos and throws what the job would throw for those that cannot be
+// read or do not go together.
 std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& options,
-                          ProgressSink& progress);
+                          const std::filesystem::path& out, ProgressSink& progress);
 // The same for two prediction files.
 std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options);
 

@@ -10,6 +10,8 @@
 namespace vggtcd {
 namespace {
 
+constexpr const char* kWithoutWeights = "detect also works without (--reconstructor classical)";
+
 // Empty: none.
 std::string found_weights(const std::string& given) {
   if (!given.empty()) return given;
@@ -17,7 +19,7 @@ std::string found_weights(const std::string& given) {
   const char* home = std::getenv("HOME");
   const auto usual =
       std::filesystem::path(home ? home : "") / ".local/share/vggt-cd/model.safetensors";
-  return std::filesystem::exists(usual) ? usual.string() : std::string();
+  return std::filesystem::is_regular_file(usual) ? usual.string() : std::string();
 }
 
 }  // namespace
@@ -41,11 +43,14 @@ std::filesystem::path require_weights(const std::string& given) {
   if (weights.empty()) {
     throw_error(ErrorCode::kWeights,
                 "no network weights: expected --weights FILE, VGGTCD_WEIGHTS or "
-                "~/.local/share/vggt-cd/model.safetensors; detect also works without "
-                "(--reconstructor classical)");
+                "~/.local/share/vggt-cd/model.safetensors; {}",
+                kWithoutWeights);
   }
   if (!std::filesystem::is_regular_file(weights)) {
-    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file", weights);
+    throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found {}; {}",
+                given.empty() ? "VGGTCD_WEIGHTS: " : "", weights,
+                std::filesystem::exists(weights) ? "no file but a directory" : "no such file",
+                kWithoutWeights);
   }
   return weights;
 }

@@ -79,9 +79,10 @@ SfmPhotos load(const PhotoEpochs& photos, int max_side_px, ProgressSink& progres
   for (size_t i = 0; i < all.size(); ++i) {
     if (orientation_of(loaded.images[i]) == wanted) continue;
     throw_error(ErrorCode::kInput,
-                "{} is {} and {} is {}; expected photos of one orientation: turn or leave out the "
-                "others",
-                all[i]->name, orientation_of(loaded.images[i]), all[0]->name, wanted);
+                "{}/{} is {} and before/{} is {}; expected photos of one orientation: turn or "
+                "leave out the others",
+                i < photos.before.photos.size() ? "before" : "after", all[i]->name,
+                orientation_of(loaded.images[i]), all[0]->name, wanted);
   }
   loaded.camera_t1 = known_camera(photos.before, loaded.images.front());
   loaded.camera_t2 = known_camera(photos.after, loaded.images.back());
@@ -249,6 +250,7 @@ ReconstructionPlan ClassicalReconstructor::plan(const PhotoEpochs& photos) const
   ReconstructionPlan plan;
   plan.frames_before = static_cast<int>(photos.before.photos.size());
   plan.frames_after = static_cast<int>(photos.after.photos.size());
+  require_photos(plan.frames_before, plan.frames_after, options_.trust);
   plan.frames_joint = std::min(options_.keyframes, plan.frames_before) +
                       std::min(options_.keyframes, plan.frames_after);
   const Image first = load_photo(photos.before.photos.front(), photos.read);

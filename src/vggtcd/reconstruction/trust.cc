@@ -78,6 +78,16 @@ SfmTrust measure_trust(const SfmResult& sfm, int photos_t1, int photos_t2) {
   return trust;
 }
 
+void require_photos(int photos_t1, int photos_t2, const TrustOptions& options) {
+  if (std::min(photos_t1, photos_t2) >= options.min_photos) return;
+  throw_error(
+      ErrorCode::kDegenerate,
+      "classical reconstruction refused: {} photos before and {} after, at least {} of each "
+      "are needed; take ten or more overlapping photos of textured surfaces per epoch, or "
+      "use network weights (--weights)",
+      photos_t1, photos_t2, options.min_photos);
+}
+
 void require_trust(const SfmTrust& trust, const TrustOptions& options) {
   if (trust.placed_t1 + trust.placed_t2 == 0) {
     throw_error(ErrorCode::kDegenerate,

@@ -31,6 +31,9 @@ struct SfmTrust {
 
 SfmTrust measure_trust(const SfmResult& sfm, int photos_t1, int photos_t2);
 
+// Throws Error{kDegenerate} if an epoch has too few photos even if all of them are placed.
+void require_photos(int photos_t1, int photos_t2, const TrustOptions& options);
+
 // Throws Error{kDegenerate} naming the first bound that is not met.
 void require_trust(const SfmTrust& trust, const TrustOptions& options);
 

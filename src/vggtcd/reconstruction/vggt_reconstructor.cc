@@ -40,14 +40,16 @@ Frames frames_of(const EpochPhotos& epoch, const ImageReadOptions& read, int sid
   return frames;
 }
 
-void require_one_size(const Frames& frames, const Image& model, const std::string& model_name) {
+void require_one_size(const Frames& frames, const char* epoch, const Image& model,
+                      const std::string& model_name) {
   for (size_t i = 0; i < frames.images.size(); ++i) {
     const Image& image = frames.images[i];
     if (image.width == model.width && image.height == model.height) continue;
     throw_error(ErrorCode::kInput,
-                "{} becomes {} x {} px and {} {} x {} px; expected photos of one shape and "
+                "{}/{} becomes {} x {} px and {} {} x {} px; expected photos of one shape and "
                 "orientation: turn, crop or leave out the others",
-                frames.names[i], image.width, image.height, model_name, model.width, model.height);
+                epoch, frames.names[i], image.width, image.height, model_name, model.width,
+                model.height);
   }
 }
 
@@ -58,9 +60,11 @@ std::pair<Frames, Frames> read_epochs(const PhotoEpochs& photos, int side, Progr
   const size_t all = num_before + photos.after.photos.size();
   Frames before = frames_of(photos.before, photos.read, side, 0, all, stage);
   Frames after = frames_of(photos.after, photos.read, side, num_before, all, stage);
-  const Frames& first = photos.before.given || !photos.after.given ? before : after;
-  require_one_size(before, first.images.front(), first.names.front());
-  require_one_size(after, first.images.front(), first.names.front());
+  const bool model_is_before = photos.before.given || !photos.after.given;
+  const Frames& first = model_is_before ? before : after;
+  const std::string model_name = (model_is_before ? "before/" : "after/") + first.names.front();
+  require_one_size(before, "before", first.images.front(), model_name);
+  require_one_size(after, "after", first.images.front(), model_name);
   return {std::move(before), std::move(after)};
 }
 
