@@ -107,6 +107,11 @@ class BadInput(unittest.TestCase):
     def test_identical_folders(self):
         self.assertIn("the same 4 photos", self.refusal(status=3, after="before"))
 
+    def test_a_photo_of_both_epochs_is_named(self):
+        shutil.copy(self.root / "before" / "0.ppm", self.root / "after" / "again.ppm")
+        done = run("detect", self.root / "before", self.root / "after", "-o", self.root / "out", "--dry-run")
+        self.assertRegex(done.stderr, "photos of .*after that are also in .*before tell of no change: again.ppm")
+
     def test_one_photo_a_side(self):
         for name in ("1.ppm", "2.ppm", "3.ppm"):
             (self.root / "after" / name).unlink()

@@ -206,8 +206,9 @@ std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOp
                 source, in_words(found, source));
   }
   if (found.others > 0) {
-    progress.notice(fmt::format("{}: {} files are not photos, such as {}", source, found.others,
-                                found.an_other));
+    progress.notice(found.others == 1 ? fmt::format("{}: {} is not a photo", source, found.an_other)
+                                      : fmt::format("{}: {} files are not photos, such as {}",
+                                                    source, found.others, found.an_other));
   }
   leave_out_duplicates(photos, progress);
   if (options.max_frames > 0 && static_cast<int>(photos.size()) > options.max_frames) {

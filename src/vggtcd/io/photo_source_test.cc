@@ -89,6 +89,10 @@ TEST(FindPhotos, CountsWhatIsNoPhotoInANotice) {
   RecordingProgress progress;
   EXPECT_THAT(names_of(find_photos(folder, {}, progress)), ElementsAre("a.png"));
   EXPECT_THAT(progress.notices, ElementsAre(HasSubstr("2 files are not photos")));
+  std::filesystem::remove(folder / "video.mp4");
+  RecordingProgress of_one;
+  find_photos(folder, {}, of_one);
+  EXPECT_THAT(of_one.notices, ElementsAre(HasSubstr("notes.txt is not a photo")));
 }
 
 TEST(FindPhotos, AFileStandsForItselfWhateverItsEnding) {

@@ -2,6 +2,8 @@
 // From photos to prediction files: find, plan, reconstruct, keep.
 #include "vggtcd/pipeline/photo_stages.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <set>
 
@@ -152,17 +154,18 @@ PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress)
   photos.after = epoch(inputs.after);
   std::set<uint64_t> before;
   for (const PhotoRef& photo : photos.before.photos) before.insert(content_hash(photo));
-  const auto repeated = static_cast<size_t>(
-      std::count_if(photos.after.photos.begin(), photos.after.photos.end(),
-                    [&](const PhotoRef& photo) { return before.count(content_hash(photo)) > 0; }));
-  if (repeated == photos.after.photos.size()) {
+  std::vector<std::string> repeated;
+  for (const PhotoRef& photo : photos.after.photos) {
+    if (before.contains(content_hash(photo))) repeated.push_back(photo.name);
+  }
+  if (repeated.size() == photos.after.photos.size()) {
     throw_error(ErrorCode::kInput,
                 "{} and {} hold the same {} photos; expected photos of two times", inputs.before,
-                inputs.after, repeated);
+                inputs.after, repeated.size());
   }
-  if (repeated > 0) {
-    progress.notice(
-        fmt::format("{} photos are in both {} and {}", repeated, inputs.before, inputs.after));
+  if (!repeated.empty()) {
+    progress.notice(fmt::format("photos of {} that are also in {} tell of no change: {}",
+                                inputs.after, inputs.before, fmt::join(repeated, ", ")));
   }
   return photos;
 }
