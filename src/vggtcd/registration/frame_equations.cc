@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 #include <vector>
 
 #include "vggtcd/core/parallel.h"
@@ -38,17 +37,27 @@ class Witnesses {
  public:
   Witnesses(const std::vector<SurfacePair>& pairs, int32_t SurfacePair::*frame,
             Eigen::Vector3d SurfacePair::*point) {
-    for (const SurfacePair& pair : pairs) frames_ = std::max(frames_, pair.*frame + 1);
-    centers_.resize(static_cast<size_t>(count()), Eigen::Vector3d::Zero());
-    std::vector<double> sizes(centers_.size(), 0);
-    for (const SurfacePair& pair : pairs) {
-      const size_t witness = static_cast<size_t>(of(pair.*frame));
-      const double weight = 1 / (pair.depth_u * pair.depth_u);
-      centers_[witness] += weight * pair.*point;
-      sizes[witness] += weight;
+    const auto size = static_cast<int64_t>(pairs.size());
+    std::vector<Sums> chunks(static_cast<size_t>(num_chunks(size, kGrain)));
+    parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+      for (int64_t i = begin; i < end; ++i) {
+        const SurfacePair& pair = pairs[static_cast<size_t>(i)];
+        Sums& sums = chunks[static_cast<size_t>(begin / kGrain)];
+        const auto number = static_cast<size_t>(pair.*frame);
+        if (sums.size() <= number) sums.resize(number + 1, Eigen::Vector4d::Zero());
+        const Eigen::Vector3d& x = pair.*point;
+        sums[number] += Eigen::Vector4d(x.x(), x.y(), x.z(), 1) / (pair.depth_u * pair.depth_u);
+      }
+    });
+    for (const Sums& sums : chunks) frames_ = std::max(frames_, static_cast<int32_t>(sums.size()));
+    Sums groups(static_cast<size_t>(count()), Eigen::Vector4d::Zero());
+    for (const Sums& sums : chunks) {
+      for (size_t k = 0; k < sums.size(); ++k) {
+        groups[static_cast<size_t>(of(static_cast<int32_t>(k)))] += sums[k];
+      }
     }
-    for (size_t k = 0; k < centers_.size(); ++k) {
-      if (sizes[k] > 0) centers_[k] /= sizes[k];
+    for (const Eigen::Vector4d& group : groups) {
+      centers_.push_back(group.head<3>() / (group[3] > 0 ? group[3] : 1));
     }
   }
   int frames() const { return frames_; }
@@ -59,6 +68,8 @@ class Witnesses {
   }
 
  private:
+  using Sums = std::vector<Eigen::Vector4d>;  // of weighted points and weights, by frame or group
+  static constexpr int64_t kGrain = 1 << 14;
   int32_t frames_ = 0;
   std::vector<Eigen::Vector3d> centers_;
 };
@@ -76,13 +87,20 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
                                 const BlockOf& block_of, const Eigen::Vector3d& pivot,
                                 double relative_sigma) {
   // The pairs in the order of their blocks, by counting.
+  std::vector<uint32_t> blocks_of(pairs.size());
+  constexpr int64_t kPairGrain = 1 << 14;
+  parallel_for(static_cast<int64_t>(pairs.size()), kPairGrain, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      blocks_of[i] = static_cast<uint32_t>(block_of(pairs[i]));
+    }
+  });
   std::vector<size_t> starts(num_blocks + 1, 0);
-  for (const SurfacePair& pair : pairs) ++starts[block_of(pair) + 1];
+  for (const uint32_t block : blocks_of) ++starts[block + 1];
   std::partial_sum(starts.begin(), starts.end(), starts.begin());
   std::vector<uint32_t> order(pairs.size());
   std::vector<size_t> next(starts.begin(), starts.end() - 1);
   for (size_t i = 0; i < pairs.size(); ++i) {
-    order[next[block_of(pairs[i])]++] = static_cast<uint32_t>(i);
+    order[next[blocks_of[i]]++] = static_cast<uint32_t>(i);
   }
   std::vector<Block> blocks(num_blocks);
   const auto add = [&](const SurfacePair& pair, Block& block) {
@@ -119,12 +137,8 @@ struct PhotoSystem {
 
 PhotoSystem assemble(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
                      const FrameSpread& spread, double min_relative_sigma) {
-  std::optional<Witnesses> sides[2];  // at the same time
-  parallel_for(2, 1, [&](int64_t side, int64_t) {
-    if (side == 0) sides[0].emplace(pairs, &SurfacePair::frame_t1, &SurfacePair::moving);
-    if (side == 1) sides[1].emplace(pairs, &SurfacePair::frame_t2, &SurfacePair::fixed);
-  });
-  PhotoSystem system{.of_t1 = std::move(*sides[0]), .of_t2 = std::move(*sides[1])};
+  PhotoSystem system{.of_t1 = {pairs, &SurfacePair::frame_t1, &SurfacePair::moving},
+                     .of_t2 = {pairs, &SurfacePair::frame_t2, &SurfacePair::fixed}};
   system.relative_sigma = relative_sigma_of(pairs, min_relative_sigma);
   const Witnesses &of_t1 = system.of_t1, &of_t2 = system.of_t2;
   const int n1 = of_t1.count(), n2 = of_t2.count(), total = n1 + n2;
@@ -197,8 +211,6 @@ SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
     result.information = independent.information;
     result.gradient = independent.gradient;
   }
-  result.sigma_u = result.relative_sigma *
-                   median_over(pairs, [](const SurfacePair& pair) { return pair.depth_u; });
   return result;
 }
 

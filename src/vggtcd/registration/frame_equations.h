@@ -15,7 +15,6 @@ struct SurfaceEquations {
   Matrix7 information = Matrix7::Zero();
   Vector7 gradient = Vector7::Zero();
   double relative_sigma = 0;  // robust standard deviation of a residual, per depth of its pair
-  double sigma_u = 0;         // the same at the median depth
 };
 
 // What the pairs say about the photos' own similarities b, each about its centre, where theta is

@@ -9,8 +9,9 @@
 
 namespace vggtcd {
 
-// b_from_a applied to every point, in double, rounded once.
+// b_from_a applied to every stride-th point, in double, rounded once.
 std::vector<Eigen::Vector3f> map_points(const Sim3& b_from_a,
-                                        const std::vector<Eigen::Vector3f>& points_in_a);
+                                        const std::vector<Eigen::Vector3f>& points_in_a,
+                                        int stride = 1);
 
 }  // namespace vggtcd

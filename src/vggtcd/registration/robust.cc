@@ -5,7 +5,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <span>
 
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
@@ -16,6 +19,10 @@
 namespace vggtcd {
 namespace {
 
+// Of larger clouds every n-th point searches until the iteration has converged on those, about this
+// many; then all do, until it has converged again. The last iterations are kept for all.
+constexpr int64_t kSearchingPoints = 100'000;
+constexpr int kLastIterations = 2;
 // A step this small in standard deviations of the result ends the iteration.
 constexpr double kConvergedStep = 0.1;
 // Residuals are never believed to be smaller than this share of the depth: on data without noise
@@ -32,33 +39,52 @@ struct Rejected {
 Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& options) {
   const double limit = options.static_distance *
                        median_over(pairs, [](const SurfacePair& pair) { return pair.distance; });
-  Rejected rejected;
-  std::erase_if(pairs, [&](const SurfacePair& pair) {
-    if (pair.distance > limit) {
-      ++rejected.far;
-      return true;
-    }
-    if (pair.normal_cosine < options.min_normal_cosine) {
-      ++rejected.normal;
-      return true;
-    }
-    return false;
+  const auto size = static_cast<int64_t>(pairs.size());
+  constexpr int64_t kGrain = 1 << 14;
+  std::vector<Rejected> rejected(static_cast<size_t>(num_chunks(size, kGrain)));
+  const auto at = [&](int64_t i) { return pairs.begin() + i; };
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {  // each chunk to its own front
+    Rejected& of_chunk = rejected[static_cast<size_t>(begin / kGrain)];
+    std::remove_if(at(begin), at(end), [&](const SurfacePair& pair) {
+      const bool far = pair.distance > limit;
+      const bool turned = !far && pair.normal_cosine < options.min_normal_cosine;
+      of_chunk.far += far ? 1 : 0;
+      of_chunk.normal += turned ? 1 : 0;
+      return far || turned;
+    });
   });
-  return rejected;
+  Rejected all;
+  auto kept = pairs.begin();
+  for (int64_t begin = 0; begin < size; begin += kGrain) {
+    const Rejected& of_chunk = rejected[static_cast<size_t>(begin / kGrain)];
+    const int64_t end = std::min(size, begin + kGrain) - of_chunk.far - of_chunk.normal;
+    kept = kept == at(begin) ? at(end) : std::move(at(begin), at(end), kept);
+    all.far += of_chunk.far;
+    all.normal += of_chunk.normal;
+  }
+  pairs.erase(kept, pairs.end());
+  return all;
 }
 
 double cost_of(const std::vector<SurfacePair>& all, double relative_sigma,
                double min_normal_cosine) {
   if (all.empty()) return 1;
-  double sum = 0;
-  // The nearest point may lie beside the surface rather than on it, by up to the voxel size; what
-  // matters is the distance to its plane, and that it is not far away altogether.
-  for (const SurfacePair& pair : all) {
-    const bool compatible = pair.normal_cosine >= min_normal_cosine;
-    const double along = 0.25 * pair.distance;
-    const double residual = std::max(std::abs(pair.plane_residual()), along);
-    sum += compatible ? tukey_loss(residual, relative_sigma * pair.depth_u) : 1;
-  }
+  const auto size = static_cast<int64_t>(all.size());
+  constexpr int64_t kGrain = 1 << 14;
+  std::vector<double> sums(static_cast<size_t>(num_chunks(size, kGrain)), 0);
+  parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
+    double& sum = sums[static_cast<size_t>(begin / kGrain)];
+    for (const SurfacePair& pair :
+         std::span(all).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin))) {
+      // The nearest point may lie beside the surface rather than on it, by up to the voxel size;
+      // what matters is the distance to its plane, and that it is not far away altogether.
+      const bool compatible = pair.normal_cosine >= min_normal_cosine;
+      const double along = 0.25 * pair.distance;
+      const double residual = std::max(std::abs(pair.plane_residual()), along);
+      sum += compatible ? tukey_loss(residual, relative_sigma * pair.depth_u) : 1;
+    }
+  });
+  const double sum = std::accumulate(sums.begin(), sums.end(), 0.0);
   return sum / static_cast<double>(all.size());
 }
 
@@ -132,13 +158,22 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   std::vector<SurfacePair> pairs;
   Sim3 current = initial_t2_from_t1;
   Matrix7 surface_information = Matrix7::Zero();
+  int stride = 1;
+  if (options.max_iterations > kLastIterations) {
+    const int64_t times = (result.points_t1 + result.points_t2) / kSearchingPoints;
+    stride = static_cast<int>(std::clamp<int64_t>(times, 1, 1000));
+  }
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    matcher.pairs(current, options.both_directions, pairs);
+    matcher.pairs(current, options.both_directions, stride, pairs);
     const Rejected rejected = keep_static(pairs, options);
     result.pairs = static_cast<int64_t>(pairs.size());
     result.rejected_far = rejected.far;
     result.rejected_normal = rejected.normal;
+    if (result.pairs < options.min_pairs && stride > 1) {
+      stride = 1;
+      continue;
+    }
     if (result.pairs < options.min_pairs) {
       result.explanation = fmt::format(
           "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
@@ -149,7 +184,6 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     const SurfaceEquations surface =
         surface_equations(pairs, result.pivot_in_t2,
                           options.frame_errors ? &result.uncertainty.frame : nullptr, kSigmaFloor);
-    result.residual_sigma_u = surface.sigma_u;
     result.relative_sigma = surface.relative_sigma;
     surface_information = surface.information;
 
@@ -160,8 +194,13 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     const Vector7 slope = surface.gradient + prior_information * from_initial;
     const Vector7 step = -information.ldlt().solve(slope);
     current = small_similarity(step, result.pivot_in_t2) * current;
-    result.converged = step.dot(information * step) < kConvergedStep * kConvergedStep;
+    const bool small = step.dot(information * step) < kConvergedStep * kConvergedStep;
+    result.converged = small && stride == 1;
+    if (small || result.iterations + kLastIterations >= options.max_iterations) stride = 1;
   }
+  result.residual_sigma_u = result.relative_sigma * median_over(pairs, [](const SurfacePair& pair) {
+                              return pair.depth_u;
+                            });
   const Constraints constraints =
       constraints_of(without_normal_noise(surface_information, pairs, result.pivot_in_t2),
                      prior_covariance, result.pivot_in_t2);
@@ -171,7 +210,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   result.open_motions = constraints.open_motions;
 
   const auto cost_at = [&](const Sim3& t2_from_t1) {
-    matcher.pairs(t2_from_t1, true, pairs);
+    matcher.pairs(t2_from_t1, true, 1, pairs);
     return cost_of(pairs, result.relative_sigma, options.min_normal_cosine);
   };
   result.cost_initial = cost_at(initial_t2_from_t1);
@@ -188,7 +227,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   result.t2_from_t1 = current;
   if (options.camera_fit && options.frame_errors) {
     // The cost left the pairs at `current`, in both directions.
-    if (!options.both_directions) matcher.pairs(current, false, pairs);
+    if (!options.both_directions) matcher.pairs(current, false, 1, pairs);
     keep_static(pairs, options);
     const PhotoErrors photos =
         photo_errors(pairs, result.pivot_in_t2, result.uncertainty.frame, kSigmaFloor);

@@ -8,6 +8,7 @@
 
 #include "tests/support/toy_scene.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/registration/surface_pairs.h"
 
 namespace vggtcd {
 namespace {
@@ -66,6 +67,44 @@ TEST(AlignRobust, HasTheSameBitsForAnyNumberOfThreads) {
     EXPECT_EQ(result.cost_final, expected.cost_final);
   }
   set_num_threads(2);
+}
+
+// Each point as often as it takes to have that many.
+OrientedPoints repeated(const OrientedPoints& points, size_t size) {
+  OrientedPoints result = points;
+  while (result.size() < size) {
+    result.positions.insert(result.positions.end(), points.positions.begin(),
+                            points.positions.end());
+    result.normals.insert(result.normals.end(), points.normals.begin(), points.normals.end());
+    result.frames.insert(result.frames.end(), points.frames.begin(), points.frames.end());
+  }
+  return result;
+}
+
+TEST(AlignRobust, OfLargeCloudsGoesByAPartAndEndsOnAllPoints) {
+  const OrientedPoints t1 = repeated(points_of(bumps, 0), 120'000);
+  const OrientedPoints t2 = repeated(points_of(bumps, 0.13), 120'000);
+  const RobustResult result = align_robust(t1, t2, kError, {}, {});
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.pairs + result.rejected_far + result.rejected_normal,
+            static_cast<int64_t>(t1.size() + t2.size()));
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
+}
+
+TEST(SurfaceMatcher, EveryNthPointFindsWhatItFindsAmongAll) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  const SurfaceMatcher matcher(t1, t2);
+  const std::vector<SurfacePair> all = matcher.pairs(kError);
+  std::vector<SurfacePair> part;
+  matcher.pairs(kError, true, 3, part);
+  const size_t from_t1 = (t1.size() + 2) / 3;
+  ASSERT_EQ(part.size(), from_t1 + (t2.size() + 2) / 3);
+  for (size_t i = 0; i < part.size(); ++i) {
+    const SurfacePair& same = all[i < from_t1 ? 3 * i : t1.size() + 3 * (i - from_t1)];
+    EXPECT_EQ(part[i].moving, same.moving);
+    EXPECT_EQ(part[i].fixed, same.fixed);
+    EXPECT_EQ(part[i].from_t1, same.from_t1);
+  }
 }
 
 TEST(AlignRobust, IsNotDrawnByAChange) {

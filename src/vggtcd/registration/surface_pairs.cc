@@ -31,13 +31,15 @@ SurfaceMatcher::SurfaceMatcher(const OrientedPoints& t1, const OrientedPoints& t
 
 std::vector<SurfacePair> SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both) const {
   std::vector<SurfacePair> result;
-  pairs(t2_from_t1, both, result);
+  pairs(t2_from_t1, both, 1, result);
   return result;
 }
 
-void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
+void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both, int stride,
                            std::vector<SurfacePair>& result) const {
-  result.resize(t1_.size() + (both ? t2_.size() : 0));
+  const auto step = static_cast<size_t>(stride);
+  const size_t from_t1 = (t1_.size() + step - 1) / step, from_t2 = (t2_.size() + step - 1) / step;
+  result.resize(from_t1 + (both ? from_t2 : 0));
   const auto pair_of = [&](size_t i1, size_t i2, bool search_from_t1) {
     SurfacePair pair;
     pair.moving = t2_from_t1 * t1_.positions[i1].cast<double>();
@@ -64,17 +66,18 @@ void SurfaceMatcher::pairs(const Sim3& t2_from_t1, bool both,
     return pair;
   };
   constexpr int64_t kGrain = 1 << 13;
-  const NearestNeighbors of_t1 = index_t2_.query(map_points(t2_from_t1, t1_.positions));
-  parallel_for(static_cast<int64_t>(t1_.size()), kGrain, [&](int64_t begin, int64_t end) {
+  const NearestNeighbors of_t1 = index_t2_.query(map_points(t2_from_t1, t1_.positions, stride));
+  parallel_for(static_cast<int64_t>(from_t1), kGrain, [&](int64_t begin, int64_t end) {
     for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      result[i] = pair_of(i, static_cast<size_t>(of_t1.index[i]), true);
+      result[i] = pair_of(i * step, static_cast<size_t>(of_t1.index[i]), true);
     }
   });
   if (!both) return;
-  const NearestNeighbors of_t2 = index_t1_.query(map_points(t2_from_t1.inverse(), t2_.positions));
-  parallel_for(static_cast<int64_t>(t2_.size()), kGrain, [&](int64_t begin, int64_t end) {
+  const NearestNeighbors of_t2 =
+      index_t1_.query(map_points(t2_from_t1.inverse(), t2_.positions, stride));
+  parallel_for(static_cast<int64_t>(from_t2), kGrain, [&](int64_t begin, int64_t end) {
     for (size_t i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      result[t1_.size() + i] = pair_of(static_cast<size_t>(of_t2.index[i]), i, false);
+      result[from_t1 + i] = pair_of(static_cast<size_t>(of_t2.index[i]), i * step, false);
     }
   });
 }

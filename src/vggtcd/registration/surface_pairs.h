@@ -40,8 +40,9 @@ class SurfaceMatcher {
 
   // One pair per point of T1, then, with `both`, one per point of T2.
   std::vector<SurfacePair> pairs(const Sim3& t2_from_t1, bool both = true) const;
-  // The same into memory that is used again: at full size it takes as long to get as to fill.
-  void pairs(const Sim3& t2_from_t1, bool both, std::vector<SurfacePair>& result) const;
+  // The same into memory that is used again: at full size it takes as long to get as to fill. Only
+  // every stride-th point of either cloud searches, among all of the other.
+  void pairs(const Sim3& t2_from_t1, bool both, int stride, std::vector<SurfacePair>& result) const;
 
  private:
   const OrientedPoints& t1_;
