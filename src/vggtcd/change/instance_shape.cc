@@ -45,6 +45,28 @@ bool seen_through(std::span<const PosedView> views, const Eigen::Vector3d& x, do
   });
 }
 
+// The nearest and the farthest depth of the 3 x 3 pixels around one that is not on the rim.
+std::pair<double, double> window_of(const PosedView& view, int u, int v) {
+  double near = std::numeric_limits<double>::max(), far = 0;
+  for (int y = v - 1; y <= v + 1; ++y) {
+    for (int x = u - 1; x <= u + 1; ++x) {
+      const double depth = depth_at(view, x, y);
+      near = std::min(near, depth);
+      far = std::max(far, depth);
+    }
+  }
+  return {near, far};
+}
+
+struct Share {
+  int64_t yes = 0, all = 0;
+  void add(bool is) {
+    yes += is ? 1 : 0;
+    ++all;
+  }
+  double value() const { return all > 0 ? static_cast<double>(yes) / static_cast<double>(all) : 0; }
+};
+
 // The range of layers [first, last) without the outermost ones that together hold less than 1 % of
 // all cells at either end.
 std::pair<int, int> without_strays(const std::vector<int64_t>& layers, int64_t cells) {
@@ -121,8 +143,9 @@ std::vector<PosedView> posed_views(const Reconstruction& epoch, const Sim3& t2_f
   return views;
 }
 
-double share_seen_through(std::span<const SeenPoint> points, std::span<const PosedView> views) {
-  int through = 0, told = 0;
+OwnTestimony own_testimony(std::span<const SeenPoint> points, std::span<const PosedView> views,
+                           const PixelVerdict& changed) {
+  Share through, called;
   for (const SeenPoint& point : points) {
     for (size_t k = 0; k < views.size(); ++k) {
       if (k == point.view) continue;
@@ -134,21 +157,16 @@ double share_seen_through(std::span<const SeenPoint> points, std::span<const Pos
       const int u = static_cast<int>(std::lround(uv.x())),
                 v = static_cast<int>(std::lround(uv.y()));
       if (u < 1 || v < 1 || u >= width - 1 || v >= view.pinhole.height - 1) continue;
-      double near = std::numeric_limits<double>::max(), far = 0;
-      for (int y = v - 1; y <= v + 1; ++y) {
-        for (int i = y * width + u - 1; i <= y * width + u + 1; ++i) {
-          const double depth =
-              view.depth_scale * static_cast<double>(view.depth[static_cast<size_t>(i)]);
-          near = std::min(near, depth);
-          far = std::max(far, depth);
-        }
-      }
-      if (x.z() - far > kOtherSurface * x.z()) continue;  // hidden
-      through += near - x.z() > kOtherSurface * x.z() ? 1 : 0;
-      ++told;
+      const auto [near, far] = window_of(view, u, v);
+      const double tolerance = kOtherSurface * x.z();
+      if (x.z() - far <= tolerance) through.add(near - x.z() > tolerance);  // else hidden
+      const double depth = depth_at(view, u, v);
+      if (!(depth > 0) || std::abs(depth - x.z()) > tolerance) continue;
+      const auto verdict = changed(k, static_cast<size_t>(v * width + u));
+      if (verdict) called.add(*verdict);
     }
   }
-  return told > 0 ? static_cast<double>(through) / told : 0;
+  return {through.value(), called.value()};
 }
 
 ChangedSpace changed_space(const OrientedBox& box, std::span<const PosedView> own,

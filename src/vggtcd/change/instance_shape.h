@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -39,11 +41,22 @@ struct SeenPoint {
   size_t view = 0;
 };
 
-// Of the other views that the points are not hidden from, the share that looks through them: sees
-// only depths more than 3 % beyond, in the 3 x 3 pixels around. Surface is seen by all of them; a
-// point that flies between an edge and what lies behind it, or a photo that went wrong, is
-// contradicted by its own epoch. 0 if no view can tell.
-double share_seen_through(std::span<const SeenPoint> points, std::span<const PosedView> views);
+// What the photos of a thing's own epoch say about a sample of its points, each asked by all views
+// but the one that shows it.
+struct OwnTestimony {
+  // Of the views that the points are not hidden from, the share that looks through them: sees only
+  // depths more than 3 % beyond, in the 3 x 3 pixels around. Surface is seen by all of them; a
+  // point that flies between an edge and what lies behind it, or a photo that went wrong, is
+  // contradicted by its own epoch. 0 if no view can tell.
+  double seen_through = 0;
+  // Of the views that see the points' surface, within 3 %, and judged it, the share that calls it
+  // changed. 0 if no view can tell.
+  double called_changed = 0;
+};
+// Whether a pixel of a view is called changed; nothing where it was not judged.
+using PixelVerdict = std::function<std::optional<bool>(size_t view, size_t pixel)>;
+OwnTestimony own_testimony(std::span<const SeenPoint> points, std::span<const PosedView> views,
+                           const PixelVerdict& changed);
 
 // The space in which something is in one epoch and nothing in the other: cells of a regular grid
 // (about cells_across along the longest edge) before whose centre no view of `own` sees a surface

@@ -16,7 +16,7 @@ constexpr size_t kBestPhotos = 3;
 constexpr size_t kCarvingPhotos =
     8;  // photos that look through the box, those that show most of it
 constexpr int kCellsAcross = 32;
-constexpr size_t kContradictionPoints = 300;  // of a thing that its own epoch is asked about
+constexpr size_t kTestimonyPoints = 300;  // of a thing that its own epoch is asked about
 
 struct Pixel {
   int frame, u, v;
@@ -43,23 +43,13 @@ class EpochRegions {
     position_sigma_u_ = std::max(voxel_size_ / std::sqrt(12.0), changes.surface_sigma_u);
     margin_u_ = changes.surface_sigma_u;
     group();
-    const double extent = changes.scene_extent_u;
-    const auto is_thing = [&](const InstancePart& part) {
-      return part.box.size[0] >= options.min_size_fraction * extent &&
-             part.box.size[1] >= options.min_width_fraction * extent &&
-             part.confidence >= options.min_confidence;
-    };
     const Eigen::Vector3f mean = mean_color(epoch);
     std::vector<std::optional<InstancePart>> parts(members_.size());
     parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
       const auto& members = members_[static_cast<size_t>(i)];
-      if (members.size() < static_cast<size_t>(options.min_instance_points) ||
-          photos_of(members).size() < static_cast<size_t>(options.min_photos)) {
-        return;
+      if (is_thing(members, changes, options)) {
+        parts[static_cast<size_t>(i)] = measure(members, mean);
       }
-      if (contradiction(members) > options.max_contradiction) return;
-      InstancePart part = measure(members, mean);
-      if (is_thing(part)) parts[static_cast<size_t>(i)] = std::move(part);
     });
     for (size_t i = 0; i < parts.size(); ++i) {
       if (!parts[i]) continue;
@@ -106,15 +96,44 @@ class EpochRegions {
     }
   }
 
-  // How far the photos of the own epoch see through a sample of the points.
-  double contradiction(const std::vector<uint32_t>& members) const {
-    const size_t step = std::max<size_t>(1, members.size() / kContradictionPoints);
+  // Whether the points are a thing, and not noise: enough of them, of one place, that the photos of
+  // the own epoch agree on.
+  bool is_thing(const std::vector<uint32_t>& members, const ChangeSet& changes,
+                const InstanceOptions& options) const {
+    if (members.size() < static_cast<size_t>(options.min_instance_points) ||
+        photos_of(members).size() < static_cast<size_t>(options.min_photos) ||
+        mean_confidence(members) < options.min_confidence) {
+      return false;
+    }
+    const std::vector<Eigen::Vector3f> voxels = voxel_means(members);
+    const OrientedBox box = principal_box(voxels);
+    const double extent = changes.scene_extent_u;
+    const double face = std::max(voxel_size_, box.size[0]) * std::max(voxel_size_, box.size[1]);
+    const double fill = static_cast<double>(voxels.size()) * voxel_size_ * voxel_size_ / face;
+    if (box.size[0] < options.min_size_fraction * extent ||
+        box.size[1] < options.min_width_fraction * extent || fill < options.min_fill) {
+      return false;
+    }
+    const OwnTestimony own = ask_own_epoch(members, changes);
+    return own.seen_through <= options.max_contradiction &&
+           own.called_changed >= options.min_corroboration;
+  }
+
+  OwnTestimony ask_own_epoch(const std::vector<uint32_t>& members, const ChangeSet& changes) const {
+    const size_t step = std::max<size_t>(1, members.size() / kTestimonyPoints);
     std::vector<SeenPoint> sample;
     for (size_t k = step / 2; k < members.size(); k += step) {
       const uint32_t i = members[k];
       sample.push_back({positions_[i], pixels_[i] / epoch_.pixels_per_frame()});
     }
-    return share_seen_through(sample, views_);
+    return own_testimony(sample, views_, [&](size_t view, size_t in_view) -> std::optional<bool> {
+      const size_t pixel = view * epoch_.pixels_per_frame() + in_view;
+      if (change_.label.empty() ? std::isnan(change_.score[pixel])
+                                : change_.label[pixel] == ChangeLabel::kNoEvidence) {
+        return {};
+      }
+      return changes.changed(change_, pixel);
+    });
   }
 
   InstancePart measure(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
@@ -122,8 +141,7 @@ class EpochRegions {
     part.pixels = static_cast<int64_t>(members.size());
     part.box = principal_box(voxel_means(members));
     part.colors = colors(members, mean);
-    for (const uint32_t i : members) part.confidence += confidence_of(i);
-    part.confidence /= static_cast<double>(members.size());
+    part.confidence = mean_confidence(members);
 
     std::vector<InstancePhoto> photos = photos_of(members);
     std::vector<PosedView> own;
@@ -162,6 +180,12 @@ class EpochRegions {
   double confidence_of(uint32_t point) const {
     const std::vector<float>& known = change_.changed_confidence;
     return known.empty() ? 1.0 : static_cast<double>(known[point]);
+  }
+
+  double mean_confidence(const std::vector<uint32_t>& members) const {
+    double sum = 0;
+    for (const uint32_t i : members) sum += confidence_of(i);
+    return sum / static_cast<double>(members.size());
   }
 
   // One point per voxel, so that near photos do not outvote far ones.
@@ -281,9 +305,12 @@ void InstanceOptions::validate() const {
   check_field(min_voxel_points >= 1, "min_voxel_points", min_voxel_points, "at least 1");
   check_field(min_size_fraction >= 0, "min_size_fraction", min_size_fraction, "at least 0");
   check_field(min_width_fraction >= 0, "min_width_fraction", min_width_fraction, "at least 0");
+  check_field(min_fill >= 0, "min_fill", min_fill, "at least 0");
   check_field(min_photos >= 1, "min_photos", min_photos, "at least 1");
   check_field(max_contradiction >= 0 && max_contradiction <= 1, "max_contradiction",
               max_contradiction, "a number in [0, 1]");
+  check_field(min_corroboration >= 0 && min_corroboration <= 1, "min_corroboration",
+              min_corroboration, "a number in [0, 1]");
   check_field(min_confidence >= 0 && min_confidence <= 1, "min_confidence", min_confidence,
               "a number in [0, 1]");
   check_field(min_instance_points >= 1, "min_instance_points", min_instance_points, "at least 1");

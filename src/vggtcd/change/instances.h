@@ -17,14 +17,16 @@
 namespace vggtcd {
 
 struct InstanceOptions {
-  double link_fraction = 0.01;       // voxel edge / scene extent; > 0
-  int min_voxel_points = 3;          // fewer points of one voxel connect nothing; >= 1
+  double link_fraction = 0.0125;     // voxel edge / scene extent; > 0
+  int min_voxel_points = 1;          // fewer points of one voxel connect nothing; >= 1
   double min_size_fraction = 0.02;   // longest edge of the box / scene extent; >= 0
   double min_width_fraction = 0.01;  // its second longest edge; slivers along edges are noise
-  int min_instance_points = 30;      // >= 1
+  double min_fill = 0.5;             // voxels / those that cover the largest face of the box; >= 0
+  int min_instance_points = 50;      // >= 1
   int min_photos = 3;                // of its epoch that show it; >= 1
-  double max_contradiction = 0.6;    // of its own epoch's photos, share that sees through it
-  double min_confidence = 0.68;      // mean over its pixels, where votes give one; [0, 1]
+  double max_contradiction = 0.55;   // of its own epoch's photos, share that sees through it
+  double min_corroboration = 0.5;    // of those that see its surface, share that call it changed
+  double min_confidence = 0.6;       // mean over its pixels, where votes give one; [0, 1]
   double move_shape_ratio = 0.6;     // of the box edges of a pair, smaller / larger; (0, 1]
   double move_color_overlap = 0.6;   // common part of the colour histograms of a pair; (0, 1]
 
@@ -39,6 +41,9 @@ struct InstanceOptions {
           "left out.");
     field("min_width_fraction", self.min_width_fraction,
           "Instances: and those whose second longest edge is shorter than this.");
+    field("min_fill", self.min_fill,
+          "Instances: and those whose voxels, laid side by side, cover less than this share of the "
+          "largest face of the box: scattered specks.");
     field("min_instance_points", self.min_instance_points,
           "Instances: things with fewer points are left out.");
     field("min_photos", self.min_photos, "Instances: things in fewer photos are left out.");
@@ -46,6 +51,9 @@ struct InstanceOptions {
         "max_contradiction", self.max_contradiction,
         "Instances: things that more than this share of the photos of their own epoch see through "
         "are left out.");
+    field("min_corroboration", self.min_corroboration,
+          "Instances: things that less than this share of the photos of their own epoch that see "
+          "their surface call changed are left out.");
     field("min_confidence", self.min_confidence,
           "Instances: things of which the votes are less sure on average are left out.");
     field("move_shape_ratio", self.move_shape_ratio,

@@ -159,6 +159,33 @@ TEST(FindInstances, ThingsOfWhichTheVotesAreUnsureAreLeftOut) {
   EXPECT_FALSE(instances_of(c, {.min_confidence = 0.4}).instances.empty());
 }
 
+TEST(FindInstances, WhatOnlyAFewPhotosOfItsEpochCallChangedIsLeftOut) {
+  Case c = make_case(flat_relief, right_box);
+  ASSERT_EQ(instances_of(c).instances.size(), 1u);
+  // The last two of five photos take it all back.
+  EpochChange& change = c.changes.t2;
+  std::vector<float> confidence;
+  for (size_t i = 0, k = 0; i < change.label.size(); ++i) {
+    if (!is_change(change.label[i])) continue;
+    const float own = change.changed_confidence[k++];
+    if (i < 3 * c.after.pixels_per_frame()) {
+      confidence.push_back(own);
+    } else {
+      change.label[i] = ChangeLabel::kUnchanged;
+    }
+  }
+  change.changed_confidence = confidence;
+  EXPECT_EQ(instances_of(c, {.min_corroboration = 0.3}).instances.size(), 1u);
+  EXPECT_TRUE(instances_of(c, {.min_corroboration = 0.7}).instances.empty());
+}
+
+TEST(FindInstances, SpecksThatAreFarApartForTheirNumberAreLeftOut) {
+  Case c = make_case(flat_relief, right_box);
+  EXPECT_EQ(instances_of(c, {.min_fill = 0.5}).instances.size(), 1u);
+  // A box has three times the surface of its largest face at most in sight.
+  EXPECT_TRUE(instances_of(c, {.min_fill = 4}).instances.empty());
+}
+
 TEST(FindInstances, WithoutChangeThereAreNone) {
   const Case c = make_case(right_box, right_box);
   EXPECT_TRUE(instances_of(c).instances.empty());
@@ -234,19 +261,42 @@ TEST(PrincipalBox, OfARotatedBoxOfPointsHasItsSizes) {
   EXPECT_NEAR(std::abs(box.rotation.col(0).dot(axes.col(1))), 1, 1e-3);
 }
 
-TEST(ShareSeenThrough, IsThatOfTheOtherViewsThePointIsNotHiddenFrom) {
+const PixelVerdict kNothingJudged = [](size_t, size_t) { return std::optional<bool>(); };
+
+TEST(OwnTestimony, SeenThroughIsTheShareOfTheViewsThatThePointIsNotHiddenFrom) {
   const Plane near(0), far(0);  // both at z = 2
   Plane nearer(0);
   for (float& depth : nearer.depth) depth = 1.0f;
   const PosedView plane[] = {near.view, far.view};
   const PosedView mixed[] = {near.view, far.view, nearer.view};
   const SeenPoint on{{0, 0, 2}, 0}, before{{0, 0, 1.5f}, 0}, just{{0, 0, 1.95f}, 0};
-  EXPECT_EQ(share_seen_through(std::vector{on}, plane), 0);
-  EXPECT_EQ(share_seen_through(std::vector{before}, plane), 1);
-  EXPECT_EQ(share_seen_through(std::vector{just}, plane), 0);  // within 3 %
-  EXPECT_EQ(share_seen_through(std::vector{before, on}, plane), 0.5);
-  EXPECT_EQ(share_seen_through(std::vector{before}, mixed), 1);  // hidden from the third
-  EXPECT_EQ(share_seen_through(std::vector{before}, std::span(plane).first(1)), 0);  // its own
+  const auto share = [](const std::vector<SeenPoint>& points, std::span<const PosedView> views) {
+    return own_testimony(points, views, kNothingJudged).seen_through;
+  };
+  EXPECT_EQ(share({on}, plane), 0);
+  EXPECT_EQ(share({before}, plane), 1);
+  EXPECT_EQ(share({just}, plane), 0);  // within 3 %
+  EXPECT_EQ(share({before, on}, plane), 0.5);
+  EXPECT_EQ(share({before}, mixed), 1);                      // hidden from the third
+  EXPECT_EQ(share({before}, std::span(plane).first(1)), 0);  // its own
+}
+
+TEST(OwnTestimony, CalledChangedIsTheShareOfTheViewsThatSeeThePointsSurface) {
+  const Plane first(0), second(0), third(0);
+  const PosedView views[] = {first.view, second.view, third.view};
+  // Every view calls the left half of its photo changed; the third judges nothing.
+  const PixelVerdict left = [](size_t view, size_t pixel) {
+    return view == 2 ? std::optional<bool>() : std::optional(pixel % 41 < 20);
+  };
+  const SeenPoint on_left{{-0.5f, 0, 2}, 0}, on_right{{0.5f, 0, 2}, 0}, flying{{-0.4f, 0, 1.5f}, 0};
+  const auto share = [&](const std::vector<SeenPoint>& points) {
+    return own_testimony(points, views, left).called_changed;
+  };
+  EXPECT_EQ(share({on_left}), 1);
+  EXPECT_EQ(share({on_right}), 0);
+  EXPECT_EQ(share({on_left, on_right}), 0.5);
+  EXPECT_EQ(share({on_left, flying}), 1);  // nobody sees a surface where that flies
+  EXPECT_EQ(share({flying}), 0);
 }
 
 TEST(ChangedSpace, IsWhatOneEpochSeesThroughAndTheOtherDoesNot) {
