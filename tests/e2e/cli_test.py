@@ -216,6 +216,10 @@ class Detect(unittest.TestCase):
 
     # --- bad input: one line, a distinct status, nothing left behind ---
 
+    def test_register_sends_photos_to_detect(self):
+        self.expect_failure(2, ["photos", "prediction files (.npz)", "are for detect"], "register", self.root / "photos",
+                            EXAMPLE / "t2.npz")
+
     def expect_failure(self, status, words, *arguments):
         out = self.root / "bad"
         done = run(*arguments, "-o", out)

@@ -95,7 +95,7 @@ void add_benchmark(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = add_command(
       program, program.app, "benchmark",
-      "Compares registration and change detection methods on scenes with known truth. Finished "
+      "Compare registration and change detection methods on scenes with known truth. Finished "
       "scenes are kept in OUT and not computed again.",
       [arguments](ProgressSink& progress) { run(*arguments, progress); });
   command

@@ -24,9 +24,7 @@ double metres_of(const std::string& text) {
 }  // namespace
 
 void EpochArguments::add_to(CLI::App* command) {
-  command
-      ->add_option("BEFORE", before,
-                   "The before epoch, T1: predictions (.npz); for detect also photos.")
+  command->add_option("BEFORE", before, "The before epoch, T1: a prediction file (.npz).")
       ->required();
   command->add_option("AFTER", after, "The after epoch, T2.")->required();
   command

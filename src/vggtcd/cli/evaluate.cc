@@ -162,11 +162,12 @@ void run(const Arguments& arguments) {
 
 void add_evaluate(Program& program) {
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = add_command(program, program.app, "evaluate",
-                                  "Cameras of both epochs against known poses (ATE, RTE, RRE), or "
-                                  "all of detect's results against "
-                                  "the truth of a generated scene.",
-                                  [arguments](ProgressSink&) { run(*arguments); });
+  CLI::App* command =
+      add_command(program, program.app, "evaluate",
+                  "Compare cameras of both epochs with known poses (ATE, RTE, RRE), or "
+                  "all of detect's results with "
+                  "the truth of a generated scene.",
+                  [arguments](ProgressSink&) { run(*arguments); });
   command->add_option("BEFORE", arguments->before, "predicted cameras of the before epoch");
   command->add_option("AFTER", arguments->after, "predicted cameras of the after epoch");
   command->add_option("--change", arguments->change,

@@ -75,7 +75,7 @@ void add_reconstruct(Program& program) {
   const auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       add_command(program, program.app, "reconstruct",
-                  "Cameras, depth and confidence from photos of one place.",
+                  "Estimate cameras, depth and confidence from photos of one place.",
                   [arguments](ProgressSink& progress) { reconstruct(*arguments, progress); });
   command
       ->add_option("PHOTOS", arguments->photos,

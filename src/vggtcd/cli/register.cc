@@ -6,6 +6,8 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/io/photo_source.h"
+#include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/detect.h"
 
 namespace vggtcd::cli {
@@ -20,6 +22,14 @@ void add_register(Program& program) {
   CLI::App* command = add_command(
       program, program.app, "register", "Align two epochs; no change detection.",
       [arguments](ProgressSink& progress) {
+        for (const std::string& epoch : {arguments->epochs.before, arguments->epochs.after}) {
+          if (!names_photos(epoch)) continue;
+          throw_error(
+              ErrorCode::kUsage,
+              "expected two prediction files (.npz), found {}; photos are for detect, whose "
+              "OUT/sim3.json has the alignment",
+              quote(epoch));
+        }
         const auto [alignment, metric] =
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);

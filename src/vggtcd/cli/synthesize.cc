@@ -35,7 +35,7 @@ void add_synthesize(Program& program) {
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command =
       add_command(program, program.app, "synthesize",
-                  "Writes a generated scene at two times: photos, predictions as a reconstruction "
+                  "Write a generated scene at two times: photos, predictions as a reconstruction "
                   "network would "
                   "make them, and the truth.",
                   [arguments](ProgressSink& progress) { run(*arguments, progress); });
