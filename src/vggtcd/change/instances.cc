@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
+#include "vggtcd/change/split_region.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/voxel_components.h"
 
@@ -43,6 +45,7 @@ class EpochRegions {
     position_sigma_u_ = std::max(voxel_size_ / std::sqrt(12.0), changes.surface_sigma_u);
     margin_u_ = changes.surface_sigma_u;
     group();
+    split_touching(changes, options);
     const Eigen::Vector3f mean = mean_color(epoch);
     std::vector<std::optional<InstancePart>> parts(members_.size());
     parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
@@ -96,16 +99,30 @@ class EpochRegions {
     }
   }
 
+  void split_touching(const ChangeSet& changes, const InstanceOptions& options) {
+    std::vector<std::vector<RegionPoints>> parts(members_.size());
+    parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
+      parts[static_cast<size_t>(i)] =
+          split_region(members_[static_cast<size_t>(i)], positions_, components_.voxel, voxel_size_,
+                       options.split_density,
+                       [&](const RegionPoints& core) { return is_thing(core, changes, options); });
+    });
+    members_.clear();
+    for (std::vector<RegionPoints>& of_region : parts) {
+      std::ranges::move(of_region, std::back_inserter(members_));
+    }
+  }
+
   // Whether the points are a thing, and not noise: enough of them, of one place, that the photos of
   // the own epoch agree on.
-  bool is_thing(const std::vector<uint32_t>& members, const ChangeSet& changes,
+  bool is_thing(const RegionPoints& members, const ChangeSet& changes,
                 const InstanceOptions& options) const {
     if (members.size() < static_cast<size_t>(options.min_instance_points) ||
         photos_of(members).size() < static_cast<size_t>(options.min_photos) ||
         mean_confidence(members) < options.min_confidence) {
       return false;
     }
-    const std::vector<Eigen::Vector3f> voxels = voxel_means(members);
+    const std::vector<Eigen::Vector3f> voxels = voxel_means(members, positions_, components_.voxel);
     const OrientedBox box = principal_box(voxels);
     const double extent = changes.scene_extent_u;
     const double face = std::max(voxel_size_, box.size[0]) * std::max(voxel_size_, box.size[1]);
@@ -119,7 +136,7 @@ class EpochRegions {
            own.called_changed >= options.min_corroboration;
   }
 
-  OwnTestimony ask_own_epoch(const std::vector<uint32_t>& members, const ChangeSet& changes) const {
+  OwnTestimony ask_own_epoch(const RegionPoints& members, const ChangeSet& changes) const {
     const size_t step = std::max<size_t>(1, members.size() / kTestimonyPoints);
     std::vector<SeenPoint> sample;
     for (size_t k = step / 2; k < members.size(); k += step) {
@@ -136,10 +153,10 @@ class EpochRegions {
     });
   }
 
-  InstancePart measure(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
+  InstancePart measure(const RegionPoints& members, const Eigen::Vector3f& mean) const {
     InstancePart part;
     part.pixels = static_cast<int64_t>(members.size());
-    part.box = principal_box(voxel_means(members));
+    part.box = principal_box(voxel_means(members, positions_, components_.voxel));
     part.colors = colors(members, mean);
     part.confidence = mean_confidence(members);
 
@@ -182,37 +199,19 @@ class EpochRegions {
     return known.empty() ? 1.0 : static_cast<double>(known[point]);
   }
 
-  double mean_confidence(const std::vector<uint32_t>& members) const {
+  double mean_confidence(const RegionPoints& members) const {
     double sum = 0;
     for (const uint32_t i : members) sum += confidence_of(i);
     return sum / static_cast<double>(members.size());
   }
 
-  // One point per voxel, so that near photos do not outvote far ones.
-  std::vector<Eigen::Vector3f> voxel_means(const std::vector<uint32_t>& members) const {
-    std::vector<uint32_t> order = members;
-    std::ranges::stable_sort(order, {}, [&](uint32_t i) { return components_.voxel[i]; });
-    std::vector<Eigen::Vector3f> means;
-    for (size_t begin = 0; begin < order.size();) {
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      size_t end = begin;
-      for (; end < order.size() && components_.voxel[order[end]] == components_.voxel[order[begin]];
-           ++end) {
-        sum += positions_[order[end]].cast<double>();
-      }
-      means.push_back((sum / static_cast<double>(end - begin)).cast<float>());
-      begin = end;
-    }
-    return means;
-  }
-
-  ColorHistogram colors(const std::vector<uint32_t>& members, const Eigen::Vector3f& mean) const {
+  ColorHistogram colors(const RegionPoints& members, const Eigen::Vector3f& mean) const {
     ColorSum sum;
     for (const uint32_t i : members) sum.add(&epoch_.color[3 * size_t{pixels_[i]}], mean);
     return sum.normalized();
   }
 
-  std::vector<InstancePhoto> photos_of(const std::vector<uint32_t>& members) const {
+  std::vector<InstancePhoto> photos_of(const RegionPoints& members) const {
     std::vector<InstancePhoto> photos;  // members are in pixel order, so photo by photo
     for (const uint32_t i : members) {
       const int frame = pixel_at(epoch_, pixels_[i]).frame;
@@ -225,7 +224,7 @@ class EpochRegions {
   }
 
   // The area that the photos see: per voxel the mean over the photos that show it.
-  double surface(const std::vector<uint32_t>& members) const {
+  double surface(const RegionPoints& members) const {
     std::vector<uint32_t> order = members;
     std::ranges::stable_sort(order, {}, [&](uint32_t i) { return components_.voxel[i]; });
     double total = 0;
@@ -253,9 +252,9 @@ class EpochRegions {
   std::vector<Eigen::Vector3f> positions_;  // of the changed points, T2, in pixel order
   std::vector<uint32_t> pixels_;
   VoxelComponents components_;
-  std::vector<std::vector<uint32_t>> members_;  // points of each component, in pixel order
+  std::vector<RegionPoints> members_;  // points of each region or part, in pixel order
   std::vector<InstancePart> parts_;
-  std::vector<size_t> kept_;  // component of each part
+  std::vector<size_t> kept_;  // members of each part that is a thing
 };
 
 // How well two things agree; 0 if they are not the same thing.
@@ -303,6 +302,7 @@ std::vector<Pair> match_moved(const std::vector<InstancePart>& removed,
 void InstanceOptions::validate() const {
   check_field(link_fraction > 0, "link_fraction", link_fraction, "a positive number");
   check_field(min_voxel_points >= 1, "min_voxel_points", min_voxel_points, "at least 1");
+  check_field(split_density >= 0, "split_density", split_density, "at least 0");
   check_field(min_size_fraction >= 0, "min_size_fraction", min_size_fraction, "at least 0");
   check_field(min_width_fraction >= 0, "min_width_fraction", min_width_fraction, "at least 0");
   check_field(min_fill >= 0, "min_fill", min_fill, "at least 0");

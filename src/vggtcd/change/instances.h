@@ -19,6 +19,7 @@ namespace vggtcd {
 struct InstanceOptions {
   double link_fraction = 0.0125;     // voxel edge / scene extent; > 0
   int min_voxel_points = 1;          // fewer points of one voxel connect nothing; >= 1
+  double split_density = 0.5;        // of a region's median points per voxel; thinner ones divide
   double min_size_fraction = 0.02;   // longest edge of the box / scene extent; >= 0
   double min_width_fraction = 0.01;  // its second longest edge; slivers along edges are noise
   double min_fill = 0.5;             // voxels / those that cover the largest face of the box; >= 0
@@ -36,6 +37,9 @@ struct InstanceOptions {
           "are one thing.");
     field("min_voxel_points", self.min_voxel_points,
           "Instances: voxels with fewer changed points are noise.");
+    field("split_density", self.split_density,
+          "Instances: a region is divided where its voxels hold less than this share of the median "
+          "number of points, if what is left are things by themselves; 0 divides nothing.");
     field("min_size_fraction", self.min_size_fraction,
           "Instances: things whose longest edge is shorter than this share of the scene extent are "
           "left out.");
@@ -107,7 +111,8 @@ struct ChangeInstances {
 };
 
 // Changed points (by label where there are labels, else by distance; T1's are removed, T2's added)
-// in touching voxels are one instance; it must reach the minimum size. A point is uncertain by
+// in touching voxels are one region, divided where it is thin (split_region.h); each part that is
+// large, dense and corroborated enough is an instance. A point is uncertain by
 // position_sigma of its depth, or by a voxel, whichever is more. A removed and an added instance
 // that agree in shape and colour are one that moved, best agreement first. A thing that moved by
 // less than its own size leaves two partial regions and is usually not recognised as moved.
