@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "vggtcd/geometry/order_statistics.h"
+
 namespace vggtcd {
 namespace {
 
@@ -82,9 +84,7 @@ double sigma_within(const std::vector<Sample>& samples, double gate, int& count)
   }
   count = static_cast<int>(gaps.size());
   if (gaps.empty()) return 0;
-  const auto middle = gaps.begin() + static_cast<int64_t>(gaps.size() / 2);
-  std::nth_element(gaps.begin(), middle, gaps.end());
-  return kSigmaFromMad * *middle;
+  return kSigmaFromMad * middle_of(std::move(gaps));
 }
 
 }  // namespace

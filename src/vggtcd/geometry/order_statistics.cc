@@ -152,4 +152,11 @@ Eigen::Matrix3Xd percentiles(std::span<const Eigen::Vector3f> positions,
   return result;
 }
 
+double middle_of(std::vector<double> values) {
+  check(!values.empty(), "middle_of: at least one value");
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 }  // namespace vggtcd

@@ -23,4 +23,7 @@ std::vector<double> percentiles(std::span<const float> values, std::span<const d
 Eigen::Matrix3Xd percentiles(std::span<const Eigen::Vector3f> positions,
                              std::span<const double> percents);
 
+// For a handful of doubles: the middle one, of an even number the upper of the two.
+double middle_of(std::vector<double> values);
+
 }  // namespace vggtcd

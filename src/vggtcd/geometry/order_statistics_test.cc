@@ -32,6 +32,13 @@ double percentile_by_sorting(std::vector<float> values, double percent) {
   return low + (high - low) * (position - static_cast<double>(below));
 }
 
+TEST(MiddleOf, IsTheMiddleOrTheUpperOfTheTwoMiddleValues) {
+  EXPECT_EQ(middle_of({3}), 3);
+  EXPECT_EQ(middle_of({5, 1, 4}), 4);
+  EXPECT_EQ(middle_of({2, 9, -1, 7}), 7);
+  EXPECT_THROW(middle_of({}), Error);
+}
+
 class OrderStatistics : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override { set_num_threads(GetParam()); }

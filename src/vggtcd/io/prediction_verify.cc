@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/io/prediction_layout.h"
 
 namespace vggtcd::internal {
@@ -67,9 +68,7 @@ double median_relative_error(const Reconstruction& reconstruction,
                                                    static_cast<double>(in_frame / width), depth);
     errors.push_back((x_in_world - sample.x_in_file).norm() / depth);
   }
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  return *middle;
+  return middle_of(std::move(errors));
 }
 
 }  // namespace

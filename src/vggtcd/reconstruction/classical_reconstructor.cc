@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/reconstruction/undistort.h"
 
@@ -47,9 +48,7 @@ std::optional<KnownCamera> known_camera(const EpochPhotos& epoch, const Image& r
   const auto median = [&](double Pinhole::*field) {
     std::vector<double> values;
     for (const View& view : epoch.given->views) values.push_back(view.pinhole.*field);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+    return middle_of(std::move(values));
   };
   const double scale = static_cast<double>(reduced.width) / epoch.given->width;
   return KnownCamera{scale * median(&Pinhole::fx), scale * (median(&Pinhole::cx) + 0.5) - 0.5,

@@ -8,15 +8,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "vggtcd/geometry/order_statistics.h"
+
 namespace vggtcd {
 namespace {
-
-double median_of(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double widest_angle_deg(const SfmPoint& point, const std::vector<Eigen::Vector3d>& centers) {
   double widest = 0;
@@ -73,8 +68,8 @@ SfmTrust measure_trust(const SfmResult& sfm, int photos_t1, int photos_t2) {
     planar.push_back(static_cast<double>(pair.homography_inliers) /
                      static_cast<double>(pair.matches.size()));
   }
-  trust.median_angle_deg = median_of(angles);
-  trust.homography_share = median_of(planar);
+  if (!angles.empty()) trust.median_angle_deg = middle_of(std::move(angles));
+  if (!planar.empty()) trust.homography_share = middle_of(std::move(planar));
   return trust;
 }
 

@@ -7,17 +7,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "vggtcd/geometry/order_statistics.h"
+
 namespace vggtcd {
 namespace {
 
 double angle_deg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 struct Candidate {
@@ -67,7 +63,7 @@ std::vector<DepthTask> plan_depth(const SfmModel& model, const std::vector<int>&
       const auto& shared = angles[i * count + j];
       if (group_of_view[i] != group_of_view[j]) continue;
       if (static_cast<int>(shared.size()) < options.min_shared_points) continue;
-      const double angle = median_of(shared);
+      const double angle = middle_of(shared);
       if (angle < options.min_angle_deg || angle > options.max_angle_deg) continue;
       // A bell over the ratio to the best angle, so that half and double are as good.
       const double ratio = std::log(angle / options.best_angle_deg);
@@ -85,7 +81,7 @@ std::vector<DepthTask> plan_depth(const SfmModel& model, const std::vector<int>&
       tasks[i].sources.push_back(candidate.view);
       chosen_angles.push_back(candidate.angle_deg);
     }
-    if (!chosen_angles.empty()) tasks[i].median_angle_deg = median_of(chosen_angles);
+    if (!chosen_angles.empty()) tasks[i].median_angle_deg = middle_of(chosen_angles);
   }
   return tasks;
 }
