@@ -97,6 +97,20 @@ double depth_step(const PosedView& view, int u, int v, int du, int dv) {
   return steps > 0 ? sum / steps : std::numeric_limits<double>::quiet_NaN();
 }
 
+// The same box with its axes in the order of their lengths, right-handed.
+OrientedBox largest_first(const OrientedBox& box) {
+  std::array<int, 3> order = {0, 1, 2};
+  std::ranges::stable_sort(order, [&](int a, int b) { return box.size[a] > box.size[b]; });
+  OrientedBox sorted = box;
+  for (int k = 0; k < 3; ++k) {
+    const int axis = order[static_cast<size_t>(k)];
+    sorted.rotation.col(k) = box.rotation.col(axis);
+    sorted.size[k] = box.size[axis];
+  }
+  if (sorted.rotation.determinant() < 0) sorted.rotation.col(2) = -sorted.rotation.col(2);
+  return sorted;
+}
+
 }  // namespace
 
 OrientedBox principal_box(std::span<const Eigen::Vector3f> points) {
@@ -118,18 +132,10 @@ OrientedBox principal_box(std::span<const Eigen::Vector3f> points) {
   }
   const double percents[] = {kLowPercent, kHighPercent};
   const Eigen::Matrix3Xd range = percentiles(along, percents);
+  const Eigen::Vector3d center = mean + axes * (0.5 * (range.col(0) + range.col(1)));
   const Eigen::Vector3d size = range.col(1) - range.col(0);
-  std::array<int, 3> order = {2, 1, 0};
-  std::ranges::stable_sort(order, [&](int a, int b) { return size[a] > size[b]; });
-  OrientedBox box;
-  box.center = mean + axes * (0.5 * (range.col(0) + range.col(1)));
-  for (int k = 0; k < 3; ++k) {
-    const int axis = order[static_cast<size_t>(k)];
-    box.rotation.col(k) = axes.col(axis);
-    box.size[k] = size[axis];
-  }
+  OrientedBox box = largest_first({center, axes.rowwise().reverse(), size.reverse()});
   box.size = box.size.cwiseMax(kMinRelativeEdge * box.size[0]);
-  if (box.rotation.determinant() < 0) box.rotation.col(2) = -box.rotation.col(2);
   return box;
 }
 
@@ -205,7 +211,7 @@ ChangedSpace changed_space(const OrientedBox& box, std::span<const PosedView> ow
   OrientedBox grown = box;
   grown.center += box.rotation * (0.5 * (low + high));
   grown.size = high - low;
-  return {static_cast<double>(solid) * step.prod(), grown};
+  return {static_cast<double>(solid) * step.prod(), largest_first(grown)};
 }
 
 double pixel_area(const PosedView& view, int u_px, int v_px) {

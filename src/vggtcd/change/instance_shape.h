@@ -64,7 +64,7 @@ OwnTestimony own_testimony(std::span<const SeenPoint> points, std::span<const Po
 // was seen to whatever the other epoch sees behind it. Where `other` is empty the first half
 // decides alone. Bounded by the box, grown where it is thinner than its middle edge by the
 // difference on both sides. Returns the volume (T2 units cubed) and the box grown to hold the
-// cells.
+// cells, its edges in order again.
 struct ChangedSpace {
   double volume_u3 = 0;
   OrientedBox box;

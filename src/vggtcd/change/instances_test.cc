@@ -329,6 +329,20 @@ TEST(ChangedSpace, GrowsAThinBoxToWhatTheOtherEpochSeesBehindIt) {
   EXPECT_NEAR(space.box.center.z(), 1.75, 0.011);
 }
 
+TEST(ChangedSpace, KeepsTheEdgesOfAGrownBoxInTheOrderOfTheirLengths) {
+  Plane near(0), far(0);
+  for (float& depth : near.depth) depth = 1.5f;
+  const PosedView own[] = {near.view}, other[] = {far.view};
+  OrientedBox sheet;
+  sheet.size = {0.6, 0.4, 0.001};
+  sheet.center = {0, 0, 1.75};
+  const OrientedBox box = changed_space(sheet, own, other, 0, 30).box;
+  // Along z it now reaches from the near surface to the far one, in cells of 0.02.
+  EXPECT_TRUE(box.size.isApprox(Eigen::Vector3d(0.6, 0.5, 0.4), 0.05)) << box.size.transpose();
+  EXPECT_EQ(std::abs(box.rotation(2, 1)), 1);
+  EXPECT_EQ(box.rotation.determinant(), 1);
+}
+
 TEST(InstanceOptions, RefuseAVoxelWithoutSize) {
   EXPECT_THROW(InstanceOptions{.link_fraction = 0}.validate(), Error);
 }
