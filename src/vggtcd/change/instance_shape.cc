@@ -20,6 +20,9 @@ constexpr double kJump = 0.05;             // relative step in depth that is an 
 constexpr int kColorBins = 5;              // per channel
 constexpr float kBrightest = 2.5f;         // times the mean; brighter falls into the last bin
 constexpr double kOtherSurface = 0.03;     // relative: depths closer than this are one surface
+constexpr double kMisplaced = 0.06;        // relative: as far as photos put one surface apart
+constexpr double kMinSight = 0.01;         // of the view that shows a point
+constexpr double kStepsAcross = 160;       // see photo_step
 constexpr size_t kColorStride = 97;        // every 97th pixel is looked at for the mean colour
 constexpr double kMinRelativeEdge = 1e-3;  // of the longest edge: no box is without thickness
 
@@ -67,6 +70,35 @@ struct Share {
   double value() const { return all > 0 ? static_cast<double>(yes) / static_cast<double>(all) : 0; }
 };
 
+// By how many pixels photos misplace a surface against each other: 1/160 of their width.
+int photo_step(const PosedView& view) {
+  return std::max(1, static_cast<int>(std::lround(view.pinhole.width / kStepsAcross)));
+}
+
+// How well a view sees the surface at x: the squared cosine of the angle between its ray and the
+// normal if a pixel next to x is a member and shows that surface, else 0.
+double sight_of(const PosedView& view, size_t index, const Eigen::Vector3d& x,
+                const Eigen::Vector3d& normal,
+                const std::function<bool(size_t view, size_t pixel)>& is_member) {
+  const Eigen::Vector3d in_camera = view.camera_from_t2 * x;
+  const double cosine = -(view.camera_from_t2.rotation * normal).dot(in_camera.normalized());
+  if (!(in_camera.z() > 0) || !(cosine > 0)) return 0;
+  const Eigen::Vector2d uv = view.pinhole.project(in_camera);
+  if (!view.pinhole.contains(uv.x(), uv.y())) return 0;
+  const int u = static_cast<int>(std::lround(uv.x())), v = static_cast<int>(std::lround(uv.y()));
+  const int reach = photo_step(view);
+  for (int y = v - reach; y <= v + reach; ++y) {
+    for (int i = u - reach; i <= u + reach; ++i) {
+      const double depth = depth_at(view, i, y);
+      if (depth > 0 && std::abs(depth - in_camera.z()) <= kMisplaced * in_camera.z() &&
+          is_member(index, static_cast<size_t>(y * view.pinhole.width + i))) {
+        return cosine * cosine;
+      }
+    }
+  }
+  return 0;
+}
+
 // The range of layers [first, last) without the outermost ones that together hold less than 1 % of
 // all cells at either end.
 std::pair<int, int> without_strays(const std::vector<int64_t>& layers, int64_t cells) {
@@ -82,19 +114,36 @@ std::pair<int, int> without_strays(const std::vector<int64_t>& layers, int64_t c
   return {first, last};
 }
 
-// The step in depth to the next pixel along (du, dv), centred where both neighbours are there and
-// no edge lies between; NaN: none.
+// The step in depth to the next pixel along (du, dv): of those to either side that are no edge the
+// smaller one, because noise and the rim of a thing look like slopes; NaN: none.
 double depth_step(const PosedView& view, int u, int v, int du, int dv) {
   const double here = depth_at(view, u, v);
-  double sum = 0;
-  int steps = 0;
+  double step = std::numeric_limits<double>::quiet_NaN();
   for (const int sign : {-1, 1}) {
     const double there = depth_at(view, u + sign * du, v + sign * dv);
     if (!(there > 0) || std::abs(there - here) > kJump * here) continue;
-    sum += sign * (there - here);
-    ++steps;
+    const double own = sign * (there - here);
+    if (!(std::abs(step) <= std::abs(own))) step = own;
   }
-  return steps > 0 ? sum / steps : std::numeric_limits<double>::quiet_NaN();
+  return step;
+}
+
+// The normal of the surface at a pixel, in the camera and towards it, as long as the area that the
+// pixel covers is large.
+Eigen::Vector3d surface_element(const PosedView& view, int u_px, int v_px) {
+  const double z = depth_at(view, u_px, v_px);
+  const Pinhole& k = view.pinhole;
+  const double facing = z * z / (k.fx * k.fy);
+  const int step = photo_step(view);
+  const double along_u = depth_step(view, u_px, v_px, step, 0) / step;
+  const double along_v = depth_step(view, u_px, v_px, 0, step) / step;
+  const Eigen::Vector3d ray = k.unproject(u_px, v_px, 1.0);
+  if (std::isnan(along_u) || std::isnan(along_v)) return -facing * ray.normalized();
+  // The derivatives of the point z (x, y, 1), x = (u - cx) / fx, y = (v - cy) / fy.
+  const Eigen::Vector3d du = along_u * ray + Eigen::Vector3d(z / k.fx, 0, 0);
+  const Eigen::Vector3d dv = along_v * ray + Eigen::Vector3d(0, z / k.fy, 0);
+  const Eigen::Vector3d element = dv.cross(du);
+  return element * std::min(1.0, kMaxSlope * facing / element.norm());
 }
 
 // The same box with its axes in the order of their lengths, right-handed.
@@ -214,18 +263,53 @@ ChangedSpace changed_space(const OrientedBox& box, std::span<const PosedView> ow
   return {static_cast<double>(solid) * step.prod(), largest_first(grown)};
 }
 
+SeenSurface seen_surface(std::span<const SeenPixel> sample, double weight,
+                         std::span<const PosedView> views,
+                         const std::function<bool(size_t view, size_t pixel)>& is_member) {
+  double total = 0;
+  std::vector<double> lost(views.size());  // by leaving a view out
+  std::vector<bool> shows(views.size());   // any of the sample
+  std::vector<double> sight(views.size());
+  for (const SeenPixel& point : sample) {
+    const PosedView& own = views[point.view];
+    const Eigen::Vector3d element = surface_element(own, point.u_px, point.v_px);
+    const Eigen::Vector3d x = point.x_in_t2.cast<double>();
+    const Eigen::Vector3d normal = own.camera_from_t2.rotation.transpose() * element.normalized();
+    const double cosine = normal.dot((camera_center(own.camera_from_t2) - x).normalized());
+    double sum = 0;
+    for (size_t k = 0; k < views.size(); ++k) {
+      sight[k] = k == point.view ? std::max(kMinSight, cosine * cosine)
+                                 : sight_of(views[k], k, x, normal, is_member);
+      sum += sight[k];
+    }
+    const double area = weight * element.norm() * sight[point.view];
+    total += area / sum;
+    shows[point.view] = true;
+    for (size_t k = 0; k < views.size(); ++k) {
+      if (k == point.view) {
+        lost[k] += area / sum;
+      } else if (sight[k] > 0) {
+        lost[k] += area / sum - area / (sum - sight[k]);
+      }
+    }
+  }
+  if (sample.empty()) return {};
+  const auto count = static_cast<double>(std::ranges::count(shows, true));
+  double sum = 0, squares = 0;
+  for (size_t k = 0; k < views.size(); ++k) {
+    if (!shows[k]) continue;
+    sum += lost[k];
+    squares += lost[k] * lost[k];
+  }
+  const double jackknife = (count - 1) / count * (squares - sum * sum / count);
+  // Half a step along the outline, 2 sqrt(pi m) pixels long where a photo shows m.
+  const double pixels = weight * static_cast<double>(sample.size()) / count;
+  const double outline = total * std::sqrt(M_PI / pixels) * photo_step(views[sample[0].view]);
+  return {total, std::sqrt(std::max(0.0, jackknife) + outline * outline)};
+}
+
 double pixel_area(const PosedView& view, int u_px, int v_px) {
-  const double z = depth_at(view, u_px, v_px);
-  const Pinhole& k = view.pinhole;
-  const double facing = z * z / (k.fx * k.fy);
-  const double along_u = depth_step(view, u_px, v_px, 1, 0);
-  const double along_v = depth_step(view, u_px, v_px, 0, 1);
-  if (std::isnan(along_u) || std::isnan(along_v)) return facing;
-  // The derivatives of the point z (x, y, 1), x = (u - cx) / fx, y = (v - cy) / fy.
-  const Eigen::Vector3d ray = k.unproject(u_px, v_px, 1.0);
-  const Eigen::Vector3d du = along_u * ray + Eigen::Vector3d(z / k.fx, 0, 0);
-  const Eigen::Vector3d dv = along_v * ray + Eigen::Vector3d(0, z / k.fy, 0);
-  return std::min(du.cross(dv).norm(), kMaxSlope * facing);
+  return surface_element(view, u_px, v_px).norm();
 }
 
 void ColorSum::add(const uint8_t* rgb, const Eigen::Vector3f& mean_rgb) {

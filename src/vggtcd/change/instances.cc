@@ -18,6 +18,8 @@ constexpr size_t kBestPhotos = 3;
 constexpr size_t kCarvingPhotos =
     8;  // photos that look through the box, those that show most of it
 constexpr int kCellsAcross = 32;
+constexpr double kBoxDensity = 0.5;       // of the median points per voxel
+constexpr size_t kSurfacePoints = 2000;   // of a thing whose surface is added up
 constexpr size_t kTestimonyPoints = 300;  // of a thing that its own epoch is asked about
 
 struct Pixel {
@@ -156,7 +158,9 @@ class EpochRegions {
   InstancePart measure(const RegionPoints& members, const Eigen::Vector3f& mean) const {
     InstancePart part;
     part.pixels = static_cast<int64_t>(members.size());
-    part.box = principal_box(voxel_means(members, positions_, components_.voxel));
+    // Strays would stretch the box.
+    const RegionPoints dense = dense_points(members, components_.voxel, kBoxDensity);
+    part.box = principal_box(voxel_means(dense, positions_, components_.voxel));
     part.colors = colors(members, mean);
     part.confidence = mean_confidence(members);
 
@@ -172,11 +176,14 @@ class EpochRegions {
         changed_space(part.box, own, others_that_see(part.box.center), margin_u_, kCellsAcross);
     part.volume_u3 = space.volume_u3;
     part.box = space.box;
-    part.surface_u2 = surface(members);
-    // A body whose surface moves by sigma: dV = S sigma; of one radius r, dS / S = 2 sigma / r.
+    const SeenSurface seen = surface(members);
+    part.surface_u2 = seen.area_u2;
+    // A body whose whole surface, about twice what is seen, moves by sigma: dV = 2 S sigma; of one
+    // radius r, dS / S = 2 sigma / r.
     const double radius = std::max(voxel_size_, std::cbrt(part.volume_u3));
-    part.volume_sigma_u3 = part.surface_u2 * position_sigma_u_;
-    part.surface_sigma_u2 = part.surface_u2 * 2 * position_sigma_u_ / radius;
+    part.volume_sigma_u3 = 2 * part.surface_u2 * position_sigma_u_;
+    part.surface_sigma_u2 =
+        std::hypot(seen.sigma_u2, part.surface_u2 * 2 * position_sigma_u_ / radius);
     return part;
   }
 
@@ -223,26 +230,20 @@ class EpochRegions {
     return photos;
   }
 
-  // The area that the photos see: per voxel the mean over the photos that show it.
-  double surface(const RegionPoints& members) const {
-    std::vector<uint32_t> order = members;
-    std::ranges::stable_sort(order, {}, [&](uint32_t i) { return components_.voxel[i]; });
-    double total = 0;
-    for (size_t begin = 0; begin < order.size();) {
-      double area = 0;
-      int photos = 0, last_frame = -1;
-      size_t end = begin;
-      for (; end < order.size() && components_.voxel[order[end]] == components_.voxel[order[begin]];
-           ++end) {
-        const Pixel at = pixel_at(epoch_, pixels_[order[end]]);
-        area += pixel_area(views_[static_cast<size_t>(at.frame)], at.u, at.v);
-        photos += at.frame != last_frame ? 1 : 0;
-        last_frame = at.frame;
-      }
-      total += area / photos;
-      begin = end;
+  SeenSurface surface(const RegionPoints& members) const {
+    const size_t step = std::max<size_t>(1, members.size() / kSurfacePoints);
+    std::vector<SeenPixel> sample;
+    for (size_t k = step / 2; k < members.size(); k += step) {
+      const Pixel at = pixel_at(epoch_, pixels_[members[k]]);
+      sample.push_back({positions_[members[k]], static_cast<size_t>(at.frame), at.u, at.v});
     }
-    return total;
+    const double weight = static_cast<double>(members.size()) / static_cast<double>(sample.size());
+    RegionPoints own;  // in pixel order, as members are
+    for (const uint32_t i : members) own.push_back(pixels_[i]);
+    return seen_surface(sample, weight, views_, [&](size_t view, size_t in_view) {
+      const size_t pixel = view * epoch_.pixels_per_frame() + in_view;
+      return std::ranges::binary_search(own, pixel);
+    });
   }
 
   const Reconstruction& epoch_;

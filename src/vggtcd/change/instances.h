@@ -84,7 +84,7 @@ struct InstancePhoto {
 struct InstancePart {
   OrientedBox box;
   double volume_u3 = 0;        // of the part of the box that no photo of the epoch sees through
-  double volume_sigma_u3 = 0;  // surface times the uncertainty of a surface point
+  double volume_sigma_u3 = 0;  // twice the surface times the uncertainty of a surface point
   double surface_u2 = 0;       // that the photos see
   double surface_sigma_u2 = 0;
   int64_t pixels = 0;

@@ -244,6 +244,113 @@ TEST(PixelArea, OfAPlaneIsThatOfThePlane) {
   }
 }
 
+// How far along a ray a body at the origin is; 0: misses it.
+using Body = double (*)(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray);
+double ball(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {  // radius 0.5
+  const double half = -ray.dot(origin) / ray.squaredNorm();
+  const double under = half * half - (origin.squaredNorm() - 0.25) / ray.squaredNorm();
+  return under < 0 ? 0 : half - std::sqrt(under);
+}
+double cube(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {  // edges of 0.8
+  const Eigen::Array3d a = (-0.4 - origin.array()) / ray.array(),
+                       b = (0.4 - origin.array()) / ray.array();
+  const double first = a.min(b).maxCoeff(), last = a.max(b).minCoeff();
+  return first < last ? first : 0;
+}
+
+// A body seen by eight cameras from 3 away, a little above; each puts it at `misplaced` of its
+// depth too far, every second one too near. It is some 50 pixels across.
+struct Seen {
+  static constexpr int kSize = 101;
+  std::vector<std::vector<float>> depth;
+  std::vector<PosedView> views;
+  std::vector<SeenPixel> pixels;
+
+  Seen(Body body, double misplaced) {
+    for (int k = 0; k < 8; ++k) {
+      const double turn = (k + 0.3) * M_PI / 4;
+      const Eigen::Vector3d center =
+          3 * Eigen::Vector3d(std::cos(turn), 0.5, std::sin(turn)).normalized();
+      const Eigen::Vector3d z = -center.normalized();
+      const Eigen::Vector3d x = Eigen::Vector3d::UnitY().cross(z).normalized();
+      PosedView view;
+      view.pinhole = {150, 150, 50, 50, kSize, kSize};
+      view.camera_from_t2.rotation << x.transpose(), z.cross(x).transpose(), z.transpose();
+      view.camera_from_t2.translation = -view.camera_from_t2.rotation * center;
+      depth.emplace_back(kSize * kSize, 0.0f);
+      const double factor = 1 + (k % 2 == 0 ? misplaced : -misplaced);
+      for (int v = 0; v < kSize; ++v) {
+        for (int u = 0; u < kSize; ++u) {
+          const Eigen::Vector3d ray =
+              view.camera_from_t2.rotation.transpose() * view.pinhole.unproject(u, v, 1.0);
+          const double at = factor * body(center, ray);
+          if (!(at > 0)) continue;
+          depth.back()[static_cast<size_t>(kSize * v + u)] = static_cast<float>(at);
+          pixels.push_back({(center + at * ray).cast<float>(), static_cast<size_t>(k), u, v});
+        }
+      }
+      views.push_back(view);
+    }
+    for (size_t k = 0; k < views.size(); ++k) views[k].depth = depth[k];
+  }
+  SeenSurface surface(size_t step = 1) const {
+    std::vector<SeenPixel> sample;
+    for (size_t i = 0; i < pixels.size(); i += step) sample.push_back(pixels[i]);
+    return seen_surface(sample,
+                        static_cast<double>(pixels.size()) / static_cast<double>(sample.size()),
+                        views, [&](size_t view, size_t pixel) { return depth[view][pixel] > 0; });
+  }
+};
+
+TEST(SeenSurface, OfACubeIsThatOfTheFiveFacesInSight) {
+  const double truth = 5 * 0.8 * 0.8;
+  const Seen exact(cube, 0);
+  // A pixel is a fiftieth of an edge, and the slope of one that holds an edge is that of one side.
+  EXPECT_NEAR(exact.surface().area_u2, truth, 0.1 * truth);
+  EXPECT_NEAR(exact.surface().area_u2, truth, 1.96 * exact.surface().sigma_u2);
+  EXPECT_NEAR(exact.surface(7).area_u2, exact.surface().area_u2, 0.03 * truth);  // a sample
+}
+
+TEST(SeenSurface, IsNotCountedAgainWherePhotosMisplaceIt) {
+  const Seen exact(cube, 0), misplaced(cube, 0.02);  // surfaces 0.12 apart, a seventh of an edge
+  const double area = exact.surface().area_u2;
+  EXPECT_NEAR(misplaced.surface().area_u2, area, 0.15 * area);
+}
+
+TEST(SeenSurface, OfABallIsThatOfThePartThatFacesACamera) {
+  // By brute force: points evenly on the ball that face one of the cameras.
+  const Seen seen(ball, 0);
+  int in_sight = 0;
+  constexpr int kPoints = 100000;
+  for (int i = 0; i < kPoints; ++i) {
+    const double y = 1 - 2 * (i + 0.5) / kPoints, turn = i * M_PI * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - y * y);
+    const Eigen::Vector3d normal(r * std::cos(turn), y, r * std::sin(turn));
+    in_sight += std::ranges::any_of(seen.views, [&](const PosedView& view) {
+      const Eigen::Vector3d center =
+          -view.camera_from_t2.rotation.transpose() * view.camera_from_t2.translation;
+      return normal.dot(center - 0.5 * normal) > 0;
+    });
+  }
+  const double truth = 4 * M_PI * 0.25 * in_sight / kPoints;
+  // The rim of a view is lost where no other view looks at it.
+  EXPECT_NEAR(seen.surface().area_u2, truth, 0.1 * truth);
+}
+
+TEST(FindInstances, SurfaceIsThatOfTheBoxThatPhotosSee) {
+  const Case c = make_case(flat_relief, right_box);
+  const ChangeInstances found = instances_of(c);
+  ASSERT_EQ(found.instances.size(), 1u);
+  const InstancePart& part = *found.instances[0].after;
+  // The top is seen, one of the two sides across the walk, and two halves of those along it that
+  // the middle of the walk looks past.
+  const double unit = kT2FromT1.scale * kT2FromT1.scale;
+  EXPECT_GT(part.surface_u2, 0.9 * 0.36 * unit);
+  EXPECT_LT(part.surface_u2, (0.36 + 3 * 0.3) * unit);
+  EXPECT_GT(part.surface_sigma_u2, 0);
+  EXPECT_LT(part.surface_sigma_u2, part.surface_u2);
+}
+
 TEST(PrincipalBox, OfARotatedBoxOfPointsHasItsSizes) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-0.5, 0.5);

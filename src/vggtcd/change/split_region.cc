@@ -25,22 +25,6 @@ void for_voxels(const RegionPoints& points, std::span<const uint32_t> voxel, con
   }
 }
 
-// The points in voxels that hold at least min_density times the median number, in order.
-RegionPoints dense_points(const RegionPoints& region, std::span<const uint32_t> voxel,
-                          double min_density) {
-  std::vector<int64_t> counts;
-  for_voxels(region, voxel, [&](auto first, auto last) { counts.push_back(last - first); });
-  const auto middle = counts.begin() + std::ssize(counts) / 2;
-  std::ranges::nth_element(counts, middle);
-  const double least = min_density * static_cast<double>(*middle);
-  RegionPoints dense;
-  for_voxels(region, voxel, [&](auto first, auto last) {
-    if (static_cast<double>(last - first) >= least) dense.insert(dense.end(), first, last);
-  });
-  std::ranges::sort(dense);
-  return dense;
-}
-
 std::vector<RegionPoints> pieces_of(const RegionPoints& points,
                                     std::span<const Eigen::Vector3f> positions, double voxel_size) {
   std::vector<Eigen::Vector3f> own;
@@ -77,6 +61,21 @@ void add_rest(const RegionPoints& region, std::span<const Eigen::Vector3f> posit
 }
 
 }  // namespace
+
+RegionPoints dense_points(const RegionPoints& region, std::span<const uint32_t> voxel,
+                          double min_density) {
+  std::vector<int64_t> counts;
+  for_voxels(region, voxel, [&](auto first, auto last) { counts.push_back(last - first); });
+  const auto middle = counts.begin() + std::ssize(counts) / 2;
+  std::ranges::nth_element(counts, middle);
+  const double least = min_density * static_cast<double>(*middle);
+  RegionPoints dense;
+  for_voxels(region, voxel, [&](auto first, auto last) {
+    if (static_cast<double>(last - first) >= least) dense.insert(dense.end(), first, last);
+  });
+  std::ranges::sort(dense);
+  return dense;
+}
 
 std::vector<Eigen::Vector3f> voxel_means(const RegionPoints& points,
                                          std::span<const Eigen::Vector3f> positions,

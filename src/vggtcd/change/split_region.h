@@ -25,6 +25,10 @@ std::vector<RegionPoints> split_region(
     std::span<const uint32_t> voxel, double voxel_size, double min_density,
     const std::function<bool(const RegionPoints&)>& stands_alone);
 
+// The points in voxels that hold at least min_density times the median number, in their old order.
+RegionPoints dense_points(const RegionPoints& region, std::span<const uint32_t> voxel,
+                          double min_density);
+
 // The mean of the points of each voxel, in the order of the voxels: near photos do not outvote far
 // ones.
 std::vector<Eigen::Vector3f> voxel_means(const RegionPoints& points,
