@@ -104,14 +104,15 @@ std::shared_ptr<const FileLock> lock_stages(const fs::path& out) {
   return std::make_shared<const FileLock>(std::move(*lock));
 }
 
-// Files that a killed run had not finished.
+// Files that a killed run had not finished: of OutputFile (io/output_file.h), and of libzip, which
+// adds a dot and six characters to an archive's name.
 void remove_partial_files(const fs::path& folder) {
   std::vector<fs::path> partial;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (entry.is_regular_file() && name.find(".npz.partial-") != std::string::npos) {
-      partial.push_back(entry.path());
-    }
+    const bool unfinished =
+        name.find(".partial-") != std::string::npos || name.find(".npz.") != std::string::npos;
+    if (entry.is_regular_file() && unfinished) partial.push_back(entry.path());
   }
   for (const fs::path& path : partial) fs::remove(path);
 }
