@@ -27,7 +27,7 @@ struct InstanceOptions {
   int min_photos = 3;                // of its epoch that show it; >= 1
   double max_contradiction = 0.55;   // of its own epoch's photos, share that sees through it
   double min_corroboration = 0.5;    // of those that see its surface, share that call it changed
-  double min_confidence = 0.6;       // mean over its pixels, where votes give one; [0, 1]
+  double min_confidence = 0.65;      // mean over its pixels, where votes give one; [0, 1]
   double move_shape_ratio = 0.6;     // of the box edges of a pair, smaller / larger; (0, 1]
   double move_color_overlap = 0.6;   // common part of the colour histograms of a pair; (0, 1]
 
