@@ -238,11 +238,11 @@ class EpochRegions {
       sample.push_back({positions_[members[k]], static_cast<size_t>(at.frame), at.u, at.v});
     }
     const double weight = static_cast<double>(members.size()) / static_cast<double>(sample.size());
-    RegionPoints own;  // in pixel order, as members are
-    for (const uint32_t i : members) own.push_back(pixels_[i]);
     return seen_surface(sample, weight, views_, [&](size_t view, size_t in_view) {
       const size_t pixel = view * epoch_.pixels_per_frame() + in_view;
-      return std::ranges::binary_search(own, pixel);
+      // Members are in pixel order.
+      return std::ranges::binary_search(members, pixel, {},
+                                        [&](uint32_t i) { return size_t{pixels_[i]}; });
     });
   }
 

@@ -7,16 +7,20 @@
 #include <iterator>
 
 #include "vggtcd/geometry/nearest_neighbors.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/voxel_components.h"
 
 namespace vggtcd {
 namespace {
 
-// Calls use(first, last) with the points of each voxel, voxels and points in order.
+RegionPoints in_order_of_voxels(RegionPoints points, std::span<const uint32_t> voxel) {
+  std::ranges::stable_sort(points, {}, [&](uint32_t i) { return voxel[i]; });
+  return points;
+}
+
+// Calls use(first, last) with the points of each voxel, of points in the order of their voxels.
 template <typename Use>
-void for_voxels(const RegionPoints& points, std::span<const uint32_t> voxel, const Use& use) {
-  RegionPoints order = points;
-  std::ranges::stable_sort(order, {}, [&](uint32_t i) { return voxel[i]; });
+void for_voxels(const RegionPoints& order, std::span<const uint32_t> voxel, const Use& use) {
   for (auto first = order.begin(); first != order.end();) {
     const auto last =
         std::find_if(first, order.end(), [&](uint32_t i) { return voxel[i] != voxel[*first]; });
@@ -64,13 +68,13 @@ void add_rest(const RegionPoints& region, std::span<const Eigen::Vector3f> posit
 
 RegionPoints dense_points(const RegionPoints& region, std::span<const uint32_t> voxel,
                           double min_density) {
-  std::vector<int64_t> counts;
-  for_voxels(region, voxel, [&](auto first, auto last) { counts.push_back(last - first); });
-  const auto middle = counts.begin() + std::ssize(counts) / 2;
-  std::ranges::nth_element(counts, middle);
-  const double least = min_density * static_cast<double>(*middle);
+  const RegionPoints order = in_order_of_voxels(region, voxel);
+  std::vector<double> counts;
+  for_voxels(order, voxel,
+             [&](auto first, auto last) { counts.push_back(static_cast<double>(last - first)); });
+  const double least = min_density * middle_of(std::move(counts));
   RegionPoints dense;
-  for_voxels(region, voxel, [&](auto first, auto last) {
+  for_voxels(order, voxel, [&](auto first, auto last) {
     if (static_cast<double>(last - first) >= least) dense.insert(dense.end(), first, last);
   });
   std::ranges::sort(dense);
@@ -81,7 +85,7 @@ std::vector<Eigen::Vector3f> voxel_means(const RegionPoints& points,
                                          std::span<const Eigen::Vector3f> positions,
                                          std::span<const uint32_t> voxel) {
   std::vector<Eigen::Vector3f> means;
-  for_voxels(points, voxel, [&](auto first, auto last) {
+  for_voxels(in_order_of_voxels(points, voxel), voxel, [&](auto first, auto last) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (auto i = first; i != last; ++i) sum += positions[*i].template cast<double>();
     means.push_back((sum / static_cast<double>(last - first)).template cast<float>());

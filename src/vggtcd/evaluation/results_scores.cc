@@ -110,12 +110,13 @@ class Judgement {
   Judgement(const NpzReader& change, const std::string& suffix)
       : changed_(change.read<uint8_t>("changed" + suffix)) {
     const bool voted = change.has("label" + suffix);
-    if (voted) label_ = change.read<uint8_t>("label" + suffix);
     rank_ = change.read<float>((voted ? "evidence" : "score") + suffix);
-    for (size_t i = 0; i < label_.size(); ++i) {
-      if (label_[i] == kNoLabel) {
+    if (!voted) return;
+    const auto label = change.read<uint8_t>("label" + suffix);
+    for (size_t i = 0; i < label.size(); ++i) {
+      if (label[i] == kNoLabel) {
         rank_[i] = kNoEvidence;
-      } else if (label_[i] == kUnobserved || std::isnan(rank_[i])) {
+      } else if (label[i] == kUnobserved || std::isnan(rank_[i])) {
         rank_[i] = kNotObserved;
       }
     }
@@ -124,7 +125,7 @@ class Judgement {
   bool changed(size_t i) const { return changed_[i] != 0; }
 
  private:
-  std::vector<uint8_t> changed_, label_;
+  std::vector<uint8_t> changed_;
   std::vector<float> rank_;
 };
 

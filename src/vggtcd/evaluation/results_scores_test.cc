@@ -45,18 +45,20 @@ class Results : public ::testing::Test {
     truth.finish();
   }
 
+  // The photos of before that were placed, by their centres, in this order; and both of after.
+  void write_cameras(std::vector<std::pair<std::string, size_t>> photos) const {
+    photos.insert(photos.end(), {{"after/0000.jpg", 3}, {"after/0001.jpg", 4}});
+    std::vector<View> views;
+    for (const auto& [name, k] : photos) {
+      views.push_back(view_at(name, centers_[k].x, centers_[k].y, centers_[k].z));
+    }
+    write_colmap_text(results_ / "colmap", views);
+  }
+
   // Photo 1 of before was not placed. Frames are 4 x 2 px: the middles of the truth's two pixels
   // are the corners of 2 x 2 of theirs, and the last is taken.
   void write_results(bool with_labels) const {
-    std::vector<View> views;
-    for (const auto& [name, k] : {std::pair("before/0000.jpg", 0),
-                                  {"before/0002.jpg", 2},
-                                  {"after/0000.jpg", 3},
-                                  {"after/0001.jpg", 4}}) {
-      const auto& [x, y, z] = centers_[static_cast<size_t>(k)];
-      views.push_back(view_at(name, x, y, z));
-    }
-    write_colmap_text(results_ / "colmap", views);
+    write_cameras({{"before/0000.jpg", 0}, {"before/0002.jpg", 2}});
     const auto frame = [](float left, float right) {
       constexpr float kElsewhere = 99;  // never to be looked at
       return std::vector<float>{kElsewhere, kElsewhere, kElsewhere, kElsewhere,
@@ -135,15 +137,7 @@ TEST_F(Results, OfVotesHaveEvidenceWhereThereIsALabelAndRankByTheGapInSigmas) {
 
 TEST_F(Results, BelongToPhotosInTheOrderOfTheFramesNotOfTheNames) {
   write_results(false);
-  std::vector<View> views;
-  for (const auto& [name, k] : {std::pair("before/0002.jpg", 2),
-                                {"before/0000.jpg", 0},
-                                {"after/0000.jpg", 3},
-                                {"after/0001.jpg", 4}}) {
-    const auto& [x, y, z] = centers_[static_cast<size_t>(k)];
-    views.push_back(view_at(name, x, y, z));
-  }
-  write_colmap_text(results_ / "colmap", views);
+  write_cameras({{"before/0002.jpg", 2}, {"before/0000.jpg", 0}});
   const ResultsScores scores = score_results(results_, truth_);
   EXPECT_NEAR(scores.cameras.ate_mean, 0, 1e-12);
   // Now photo 0 has (changed 7, unchanged NaN) and photo 2 (changed 9; the other pixel is void).

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <span>
 
+#include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
 #include "vggtcd/registration/constraints.h"
