@@ -4,7 +4,9 @@
 #include "tests/support/toy_scene.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "vggtcd/core/error.h"
 
@@ -37,6 +39,31 @@ double depth_along(const ToyScene& scene, const Eigen::Vector3d& origin,
 }
 
 }  // namespace
+
+uint8_t checkerboard(double x, double y) {
+  const int checker = static_cast<int>(std::floor(2 * x) + std::floor(2 * y)) & 1;
+  return static_cast<uint8_t>(60 + 120 * checker);
+}
+
+uint8_t mottled(double x, double y) {
+  const auto at_corner = [](int column, int row) {
+    std::minstd_rand random(static_cast<unsigned>(100'003 + 37 * column + 1009 * row));
+    random.discard(5);
+    return static_cast<double>(random() % 1000) / 1000 - 0.5;
+  };
+  double gray = 128;
+  for (const double cell : {0.6, 0.3, 0.15}) {
+    const double u = x / cell, v = y / cell;
+    const int column = static_cast<int>(std::floor(u)), row = static_cast<int>(std::floor(v));
+    const double right = u - column, down = v - row;
+    gray +=
+        80 *
+        ((1 - down) * ((1 - right) * at_corner(column, row) + right * at_corner(column + 1, row)) +
+         down *
+             ((1 - right) * at_corner(column, row + 1) + right * at_corner(column + 1, row + 1)));
+  }
+  return static_cast<uint8_t>(std::clamp(gray, 0.0, 255.0));
+}
 
 double flat_relief(double, double) { return 0.0; }
 double box_relief(double x, double y) {
@@ -71,8 +98,7 @@ Reconstruction reconstruct(const ToyScene& scene, const Sim3& frame_from_scene) 
         const double off_center = std::hypot(u - view.pinhole.cx, v - view.pinhole.cy);
         r.depth.push_back(static_cast<float>(frame_from_scene.scale * depth));
         r.confidence.push_back(static_cast<float>(1.0 + 100.0 / (1.0 + off_center)));
-        const int checker = static_cast<int>(std::floor(2 * x.x()) + std::floor(2 * x.y())) & 1;
-        for (int c = 0; c < 3; ++c) r.color.push_back(static_cast<uint8_t>(60 + 120 * checker));
+        r.color.insert(r.color.end(), 3, scene.gray(x.x(), x.y()));
       }
     }
     view.camera_from_world = camera_from_new_world(camera_from_scene, frame_from_scene);

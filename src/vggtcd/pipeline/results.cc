@@ -60,6 +60,9 @@ Json robust_json(const RobustResult& robust) {
                {"rejected_far", robust.rejected_far},
                {"rejected_normal", robust.rejected_normal},
                {"residual_sigma_u", robust.residual_sigma_u},
+               {"tie_points", robust.ties},
+               {"tie_points_used", robust.ties_used},
+               {"compared_by", enum_to_string(robust.compared_by)},
                {"cost_initial", robust.cost_initial},
                {"cost_final", robust.cost_final},
                {"pivot_in_t2", vector_json(robust.pivot_in_t2)},
@@ -157,7 +160,7 @@ Json alignment_json(const Alignment& alignment) {
   if (alignment.robust) json["robust"] = robust_json(*alignment.robust);
   json["plausibility"] = plausibility_json(alignment.plausibility);
   for (const AlignmentCandidate& candidate : alignment.candidates) {
-    json["candidates"].push_back({{"name", candidate.name}, {"surface_cost", candidate.cost}});
+    json["candidates"].push_back({{"name", candidate.name}, {"cost", candidate.cost}});
   }
   return json;
 }

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "vggtcd/reconstruction/features.h"
+#include "vggtcd/features/features.h"
 
 namespace vggtcd {
 

@@ -8,8 +8,8 @@
 
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
+#include "vggtcd/features/features.h"
 #include "vggtcd/reconstruction/colmap_model.h"
-#include "vggtcd/reconstruction/features.h"
 
 namespace vggtcd {
 

@@ -9,7 +9,10 @@ namespace vggtcd {
 namespace {
 
 constexpr double kSurfaceWeight = 0.1;  // of what a photo shows against its camera
-constexpr double kBallShare = 0.5;      // radius of the ball around it, of the viewing distance
+// A pass is bent in waves longer than what it shows, so its photos err alike in stretches of about
+// half a walk.
+constexpr double kStretches = 2;
+constexpr double kBallShare = 0.5;  // radius of the ball around it, of the viewing distance
 
 // J^T J of the displacement of x by a small similarity about the pivot.
 Matrix7 information_at(const Eigen::Vector3d& x, const Eigen::Vector3d& pivot) {
@@ -37,19 +40,37 @@ CameraFit fit_cameras(const PhotoErrors& photos, std::span<const Eigen::Vector3d
                       const Matrix7& surface_covariance) {
   // The answer is theta + fit * b: both epochs' weighted means of their photos' similarities.
   Eigen::MatrixXd fit = Eigen::MatrixXd::Zero(7, photos.mean.size());
+  Matrix7 bend = Matrix7::Zero();
   const auto add_epoch = [&](std::span<const Eigen::Vector3d> cameras, int frames, bool is_t1) {
+    const size_t count = std::min(cameras.size(), static_cast<size_t>(frames));
+    const auto group_of = [&](size_t frame) {
+      return is_t1 ? photos.group_of_t1(frame) : photos.group_of_t2(frame);
+    };
     Matrix7 total = Matrix7::Zero();
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(7, photos.mean.size());
-    const size_t count = std::min(cameras.size(), static_cast<size_t>(frames));
     for (size_t frame = 0; frame < count; ++frame) {
-      const size_t group = is_t1 ? photos.group_of_t1(frame) : photos.group_of_t2(frame);
+      const size_t group = group_of(frame);
       const Eigen::Vector3d& center = photos.centers[group];
       const Matrix7 weight = photo_weight(cameras[frame], center, pivot);
       total += weight;
       sum.block<7, 7>(0, 7 * static_cast<Eigen::Index>(group)) +=
           weight * pivot_change(pivot - center);
     }
-    fit += (is_t1 ? 1.0 : -1.0) * total.ldlt().solve(sum);
+    const Matrix7 inverse = total.ldlt().solve(Matrix7::Identity());
+    const Eigen::MatrixXd of_epoch = inverse * sum;
+    fit += (is_t1 ? 1.0 : -1.0) * of_epoch;
+
+    const Vector7 common = of_epoch * photos.mean;
+    double scatter = 0;  // of the cameras, squared
+    for (size_t frame = 0; frame < count; ++frame) {
+      const size_t group = group_of(frame);
+      const Vector7 own = photos.mean.segment<7>(7 * static_cast<Eigen::Index>(group));
+      scatter += (point_jacobian(cameras[frame] - photos.centers[group]) * own -
+                  point_jacobian(cameras[frame] - pivot) * common)
+                     .squaredNorm();
+    }
+    const double stretches = std::min(static_cast<double>(count), kStretches);
+    bend += scatter / (3 * stretches) * inverse;
   };
   add_epoch(cameras_t1, photos.frames_t1, true);
   add_epoch(cameras_t2, photos.frames_t2, false);
@@ -59,6 +80,7 @@ CameraFit fit_cameras(const PhotoErrors& photos, std::span<const Eigen::Vector3d
   const Matrix7 response = Matrix7::Identity() + fit * photos.response;
   result.covariance = response * surface_covariance * response.transpose() +
                       fit * photos.covariance * fit.transpose();
+  result.bend = bend;
   return result;
 }
 

@@ -12,8 +12,11 @@
 namespace vggtcd {
 
 struct CameraFit {
-  Vector7 step = Vector7::Zero();  // about the pivot, on top of the surfaces' similarity
-  Matrix7 covariance = Matrix7::Zero();
+  Vector7 step = Vector7::Zero();        // about the pivot, on top of the surfaces' similarity
+  Matrix7 covariance = Matrix7::Zero();  // of the step, were photos' errors independent
+  // They are not. What this adds: the scatter of the cameras about their epoch's fit, of which each
+  // epoch has two independent samples only.
+  Matrix7 bend = Matrix7::Zero();
 };
 
 // A reconstruction is bent, so the similarity that lays its surfaces best onto the other epoch's is

@@ -25,20 +25,26 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
   const OrientedPoints t1 = oriented_points(before, options.robust_grid_resolution);
   const OrientedPoints t2 = oriented_points(after, options.robust_grid_resolution);
   AlignmentChoice choice;
-  choice.robust = align_robust(t1, t2, initial.t2_from_t1, start.uncertainty, options);
+  std::vector<TiePoint> ties;
+  if (options.tie_points) {
+    ties = find_tie_points(before, after, initial.t2_from_t1, options.tie_photos);
+  }
+  choice.robust = align_robust(t1, t2, ties, initial.t2_from_t1, start.uncertainty, options);
   choice.t2_from_t1 = initial.t2_from_t1;
   choice.chosen = initial.name;
   choice.verdict = enum_to_string(choice.robust.verdict);
   choice.explanation = choice.robust.explanation;
   choice.candidates = {initial};
-  // Too little surface to compare anything on.
+  // Too little to compare anything on.
   if (!(choice.robust.relative_sigma > 0)) return choice;
-  choice.candidates[0].cost = choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs
-                                  ? surface_cost(t1, t2, initial.t2_from_t1, choice.robust, options)
-                                  : choice.robust.cost_initial;
+  choice.candidates[0].cost =
+      choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs
+          ? candidate_cost(t1, t2, ties, initial.t2_from_t1, choice.robust, options)
+          : choice.robust.cost_initial;
   if (fine.verdict == FineVerdict::kRefined) {
     choice.candidates.push_back(
-        {"fine", fine.t2_from_t1, surface_cost(t1, t2, fine.t2_from_t1, choice.robust, options)});
+        {"fine", fine.t2_from_t1,
+         candidate_cost(t1, t2, ties, fine.t2_from_t1, choice.robust, options)});
   }
   if (choice.robust.verdict == RobustVerdict::kRefined) {
     choice.candidates.push_back({"robust", choice.robust.t2_from_t1, choice.robust.cost_final});
@@ -50,7 +56,9 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
   choice.t2_from_t1 = best.t2_from_t1;
   if (best.name == "fine") {
     choice.verdict = enum_to_string(fine.verdict);
-    choice.explanation = fine.explanation + " The full refinement fits the surfaces less well.";
+    choice.explanation = fmt::format(
+        "{} The full refinement fits the {} less well.", fine.explanation,
+        choice.robust.compared_by == CandidateCost::kSurfaces ? "surfaces" : "tie points");
   }
   return choice;
 }

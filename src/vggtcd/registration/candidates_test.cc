@@ -48,9 +48,32 @@ TEST(ChooseAlignment, TakesTheSmallestCostAndLeavesAWrongStageBehind) {
   EXPECT_LT((choice.t2_from_t1 * Eigen::Vector3d(0, 0, 5) - Eigen::Vector3d(0, 0, 5)).norm(), 0.01);
 }
 
+TEST(ChooseAlignment, GoesByTiePointsWherePhotosShowPlacesThatCanBeRecognised) {
+  // A plane: surfaces alone cannot tell that the start is off along it.
+  const auto plane = [](double camera_offset) {
+    return testing_support::reconstruct({.frames = 5,
+                                         .width = 192,
+                                         .height = 144,
+                                         .camera_offset = camera_offset,
+                                         .gray = testing_support::mottled},
+                                        Sim3{});
+  };
+  const RobustStart start{{"coarse", shifted(0.03), 0}, {}};
+  const AlignmentChoice choice = choose_alignment(plane(0), plane(0.1), start, {}, {});
+  EXPECT_EQ(choice.chosen, "robust");
+  EXPECT_EQ(choice.robust.compared_by, CandidateCost::kTiePoints);
+  EXPECT_LT((choice.t2_from_t1 * Eigen::Vector3d(0, 0, 5) - Eigen::Vector3d(0, 0, 5)).norm(),
+            0.005);
+  RobustOptions without;
+  without.tie_points = false;
+  const AlignmentChoice slid = choose_alignment(plane(0), plane(0.1), start, {}, without);
+  EXPECT_NEAR(slid.t2_from_t1.translation.x(), 0.03, 0.01);
+}
+
 TEST(ChooseAlignment, KeepsTheInitialOneWhereThereIsTooLittleSurface) {
   RobustOptions options;
   options.min_pairs = 1 << 30;
+  options.tie_points = false;
   const AlignmentChoice choice = choose_alignment(
       epoch(0), epoch(0.1), {{"initial", shifted(0.03), 0}, {}}, refined(shifted(0)), options);
   EXPECT_EQ(choice.chosen, "initial");

@@ -68,7 +68,7 @@ RobustResult align(const Build& build) {
   build(t2);
   Vector7 error;
   error << 0.01, -0.01, 0.01, 0.02, -0.02, 0.02, 0.01;
-  return align_robust(t1.points(), t2.points(), small_similarity(error, {0, 0, 0}), {}, {});
+  return align_robust(t1.points(), t2.points(), {}, small_similarity(error, {0, 0, 0}), {}, {});
 }
 
 const Eigen::Vector3d kX = Eigen::Vector3d::UnitX(), kY = Eigen::Vector3d::UnitY(),

@@ -17,6 +17,9 @@ namespace {
 constexpr double kSigmaFromMad = 1.4826;  // of a normal distribution
 constexpr double kTukeyTuning = 4.685;    // 95 % efficiency under a normal distribution
 constexpr double kPairShare = 0.5;        // found from both sides
+// Depth errs in patches of about a fifth of the photo's side, so what lies next to each other in it
+// tells the same: a photo's pairs count as this many.
+constexpr double kPatchesOfAPhoto = 20;
 // Photos next to each other in the list err alike anyway; this bounds the linear system.
 constexpr int kMaxWitnesses = 48;
 
@@ -36,7 +39,9 @@ int group_of(int32_t frame, int32_t frames) {
 class Witnesses {
  public:
   Witnesses(const std::vector<SurfacePair>& pairs, int32_t SurfacePair::*frame,
-            Eigen::Vector3d SurfacePair::*point) {
+            Eigen::Vector3d SurfacePair::*point, std::span<const PointPair> points,
+            int32_t PointPair::*frame_of_point, Eigen::Vector3d PointPair::*place) {
+    for (const PointPair& tie : points) frames_ = std::max(frames_, tie.*frame_of_point + 1);
     const auto size = static_cast<int64_t>(pairs.size());
     std::vector<Sums> chunks(static_cast<size_t>(num_chunks(size, kGrain)));
     parallel_for(size, kGrain, [&](int64_t begin, int64_t end) {
@@ -56,6 +61,15 @@ class Witnesses {
         groups[static_cast<size_t>(of(static_cast<int32_t>(k)))] += sums[k];
       }
     }
+    // Photos without surface pairs.
+    Sums lonely(groups.size(), Eigen::Vector4d::Zero());
+    for (const PointPair& tie : points) {
+      const auto group = static_cast<size_t>(of(tie.*frame_of_point));
+      if (groups[group][3] > 0) continue;
+      const Eigen::Vector3d& x = tie.*place;
+      lonely[group] += Eigen::Vector4d(x.x(), x.y(), x.z(), 1);
+    }
+    for (size_t k = 0; k < groups.size(); ++k) groups[k] += lonely[k];
     for (const Eigen::Vector4d& group : groups) {
       centers_.push_back(group.head<3>() / (group[3] > 0 ? group[3] : 1));
     }
@@ -78,6 +92,14 @@ struct Block {
   bool empty = true;
   Matrix7 information = Matrix7::Zero();
   Vector7 gradient = Vector7::Zero();
+
+  void add(const PointPair& point, const Eigen::Vector3d& pivot) {
+    const Matrix3x7 jacobian = point_jacobian(point.moving - pivot);
+    const Eigen::Matrix<double, 7, 3> weighted = jacobian.transpose() * point.information;
+    information += weighted * jacobian;
+    gradient += weighted * (point.moving - point.fixed);
+    empty = false;
+  }
 };
 
 // What pairs say about the parameters, summed up by block in the order of the pairs: the same bits
@@ -85,7 +107,7 @@ struct Block {
 template <typename BlockOf>
 std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t num_blocks,
                                 const BlockOf& block_of, const Eigen::Vector3d& pivot,
-                                double relative_sigma) {
+                                double relative_sigma, double share) {
   // The pairs in the order of their blocks, by counting.
   std::vector<uint32_t> blocks_of(pairs.size());
   constexpr int64_t kPairGrain = 1 << 14;
@@ -106,7 +128,7 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
   const auto add = [&](const SurfacePair& pair, Block& block) {
     const double residual = pair.plane_residual();
     const double sigma = relative_sigma * pair.depth_u;
-    const double weight = kPairShare * tukey_weight(residual, sigma) / (sigma * sigma);
+    const double weight = share * tukey_weight(residual, sigma) / (sigma * sigma);
     if (weight == 0) return;
     const Vector7 jacobian = plane_jacobian(pair.moving - pivot, pair.normal);
     block.information += weight * jacobian * jacobian.transpose();
@@ -122,6 +144,25 @@ std::vector<Block> sum_by_block(const std::vector<SurfacePair>& pairs, size_t nu
   return blocks;
 }
 
+// What each pair counts so that those of a photo count kPatchesOfAPhoto together, on average.
+double patch_share(const std::vector<SurfacePair>& pairs) {
+  if (pairs.empty()) return 1;
+  std::vector<bool> of_t1, of_t2;  // photos that have any
+  const auto mark = [](std::vector<bool>& photos, int32_t frame) {
+    const auto number = static_cast<size_t>(frame);
+    if (photos.size() <= number) photos.resize(number + 1);
+    photos[number] = true;
+  };
+  for (const SurfacePair& pair : pairs) {
+    mark(of_t1, pair.frame_t1);
+    mark(of_t2, pair.frame_t2);
+  }
+  const auto photos =
+      std::count(of_t1.begin(), of_t1.end(), true) + std::count(of_t2.begin(), of_t2.end(), true);
+  // Every pair is one of two photos.
+  return kPatchesOfAPhoto * static_cast<double>(photos) / (2 * static_cast<double>(pairs.size()));
+}
+
 Eigen::Index at(int block) { return 7 * Eigen::Index{block}; }
 
 // The normal equations of all unknowns: theta, the photos of T1, the photos of T2.
@@ -135,10 +176,13 @@ struct PhotoSystem {
   double relative_sigma = 0;
 };
 
-PhotoSystem assemble(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
-                     const FrameSpread& spread, double min_relative_sigma) {
-  PhotoSystem system{.of_t1 = {pairs, &SurfacePair::frame_t1, &SurfacePair::moving},
-                     .of_t2 = {pairs, &SurfacePair::frame_t2, &SurfacePair::fixed}};
+PhotoSystem assemble(const std::vector<SurfacePair>& pairs, std::span<const PointPair> points,
+                     const Eigen::Vector3d& pivot, const FrameSpread& spread,
+                     double min_relative_sigma) {
+  PhotoSystem system{.of_t1 = {pairs, &SurfacePair::frame_t1, &SurfacePair::moving, points,
+                               &PointPair::frame_t1, &PointPair::moving},
+                     .of_t2 = {pairs, &SurfacePair::frame_t2, &SurfacePair::fixed, points,
+                               &PointPair::frame_t2, &PointPair::fixed}};
   system.relative_sigma = relative_sigma_of(pairs, min_relative_sigma);
   const Witnesses &of_t1 = system.of_t1, &of_t2 = system.of_t2;
   const int n1 = of_t1.count(), n2 = of_t2.count(), total = n1 + n2;
@@ -146,8 +190,13 @@ PhotoSystem assemble(const std::vector<SurfacePair>& pairs, const Eigen::Vector3
   const auto block_of = [&](const SurfacePair& pair) {
     return static_cast<size_t>(of_t1.of(pair.frame_t1) * n2 + of_t2.of(pair.frame_t2));
   };
-  const std::vector<Block> blocks =
-      sum_by_block(pairs, static_cast<size_t>(n1 * n2), block_of, pivot, system.relative_sigma);
+  std::vector<Block> blocks =
+      sum_by_block(pairs, static_cast<size_t>(n1 * n2), block_of, pivot, system.relative_sigma,
+                   std::min(kPairShare, patch_share(pairs)));
+  for (const PointPair& point : points) {
+    blocks[static_cast<size_t>(of_t1.of(point.frame_t1) * n2 + of_t2.of(point.frame_t2))].add(
+        point, pivot);
+  }
 
   system.photos = Eigen::MatrixXd::Zero(at(total), at(total));
   system.coupling = Eigen::MatrixXd::Zero(at(total), 7);
@@ -178,6 +227,21 @@ PhotoSystem assemble(const std::vector<SurfacePair>& pairs, const Eigen::Vector3
   return system;
 }
 
+// Without the covariance, which costs more than the rest.
+PhotoErrors errors_of(const PhotoSystem& system, const Eigen::LLT<Eigen::MatrixXd>& solver) {
+  const int n1 = system.of_t1.count(), total = n1 + system.of_t2.count();
+  PhotoErrors result;
+  result.groups_t1 = n1;
+  result.frames_t1 = system.of_t1.frames();
+  result.frames_t2 = system.of_t2.frames();
+  for (int k = 0; k < total; ++k) {
+    result.centers.push_back(k < n1 ? system.of_t1.center(k) : system.of_t2.center(k - n1));
+  }
+  result.mean = -solver.solve(system.photo_gradient);
+  result.response = -solver.solve(system.coupling);
+  return result;
+}
+
 }  // namespace
 
 double tukey_weight(double residual, double sigma) {
@@ -192,44 +256,49 @@ double tukey_loss(double residual, double sigma) {
 }
 
 SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
-                                   const Eigen::Vector3d& pivot, const FrameSpread* frame_spread,
-                                   double min_relative_sigma) {
+                                   std::span<const PointPair> points, const Eigen::Vector3d& pivot,
+                                   const FrameSpread* frame_spread, double min_relative_sigma) {
   SurfaceEquations result;
   if (frame_spread) {
-    const PhotoSystem system = assemble(pairs, pivot, *frame_spread, min_relative_sigma);
+    const PhotoSystem system = assemble(pairs, points, pivot, *frame_spread, min_relative_sigma);
     const Eigen::LLT<Eigen::MatrixXd> solver(system.photos);
     result.relative_sigma = system.relative_sigma;
-    result.gradient =
-        system.gradient - system.coupling.transpose() * solver.solve(system.photo_gradient);
-    result.information =
-        system.information - system.coupling.transpose() * solver.solve(system.coupling);
+    result.photos = errors_of(system, solver);
+    const PhotoErrors& photos = *result.photos;
+    result.gradient = system.gradient + system.coupling.transpose() * photos.mean;
+    result.information = system.information + system.coupling.transpose() * photos.response;
     result.information = 0.5 * (result.information + result.information.transpose()).eval();
   } else {
     result.relative_sigma = relative_sigma_of(pairs, min_relative_sigma);
-    const Block independent = sum_by_block(
-        pairs, 1, [](const SurfacePair&) { return size_t{0}; }, pivot, result.relative_sigma)[0];
+    Block independent = sum_by_block(
+        pairs, 1, [](const SurfacePair&) { return size_t{0}; }, pivot, result.relative_sigma,
+        kPairShare)[0];
+    for (const PointPair& point : points) independent.add(point, pivot);
     result.information = independent.information;
     result.gradient = independent.gradient;
   }
   return result;
 }
 
-PhotoErrors photo_errors(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
-                         const FrameSpread& frame_spread, double min_relative_sigma) {
-  const PhotoSystem system = assemble(pairs, pivot, frame_spread, min_relative_sigma);
-  const int n1 = system.of_t1.count(), total = n1 + system.of_t2.count();
+PhotoErrors photo_errors(const std::vector<SurfacePair>& pairs, std::span<const PointPair> points,
+                         const Eigen::Vector3d& pivot, const FrameSpread& frame_spread,
+                         double min_relative_sigma) {
+  const PhotoSystem system = assemble(pairs, points, pivot, frame_spread, min_relative_sigma);
   const Eigen::LLT<Eigen::MatrixXd> solver(system.photos);
-  PhotoErrors result;
-  result.groups_t1 = n1;
-  result.frames_t1 = system.of_t1.frames();
-  result.frames_t2 = system.of_t2.frames();
-  for (int k = 0; k < total; ++k) {
-    result.centers.push_back(k < n1 ? system.of_t1.center(k) : system.of_t2.center(k - n1));
-  }
-  result.mean = -solver.solve(system.photo_gradient);
-  result.response = -solver.solve(system.coupling);
-  result.covariance = solver.solve(Eigen::MatrixXd::Identity(at(total), at(total)));
+  PhotoErrors result = errors_of(system, solver);
+  const Eigen::Index size = system.photos.rows();
+  result.covariance = solver.solve(Eigen::MatrixXd::Identity(size, size));
   return result;
+}
+
+Eigen::Vector3d PhotoErrors::displacement(const PointPair& pair, const Vector7& theta) const {
+  const auto moved_by = [&](size_t group, const Eigen::Vector3d& x) -> Eigen::Vector3d {
+    const auto rows = Eigen::seqN(7 * static_cast<Eigen::Index>(group), 7);
+    const Vector7 b = mean(rows) + response(rows, Eigen::all) * theta;
+    return point_jacobian(x - centers[group]) * b;
+  };
+  return moved_by(group_of_t1(static_cast<size_t>(pair.frame_t1)), pair.moving) -
+         moved_by(group_of_t2(static_cast<size_t>(pair.frame_t2)), pair.fixed);
 }
 
 size_t PhotoErrors::group_of_t1(size_t frame) const {

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "vggtcd/registration/small_similarity.h"
@@ -11,10 +13,11 @@
 
 namespace vggtcd {
 
-struct SurfaceEquations {
-  Matrix7 information = Matrix7::Zero();
-  Vector7 gradient = Vector7::Zero();
-  double relative_sigma = 0;  // robust standard deviation of a residual, per depth of its pair
+// A place known from both epochs, the one of T1 already mapped into T2, all in T2.
+struct PointPair {
+  Eigen::Vector3d moving = Eigen::Vector3d::Zero(), fixed = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // of moving - fixed
+  int32_t frame_t1 = 0, frame_t2 = 0;
 };
 
 // What the pairs say about the photos' own similarities b, each about its centre, where theta is
@@ -26,11 +29,20 @@ struct PhotoErrors {
   int groups_t1 = 0;
   int frames_t1 = 0, frames_t2 = 0;
   Eigen::VectorXd mean;
-  Eigen::MatrixXd response;  // [7 groups, 7]
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd response;    // [7 groups, 7]
+  Eigen::MatrixXd covariance;  // of photo_errors; else empty
 
   size_t group_of_t1(size_t frame) const;
   size_t group_of_t2(size_t frame) const;
+  // How far the photos' own errors, given theta, move the difference of a pair: J (b_i - b_j).
+  Eigen::Vector3d displacement(const PointPair& pair, const Vector7& theta) const;
+};
+
+struct SurfaceEquations {
+  Matrix7 information = Matrix7::Zero();
+  Vector7 gradient = Vector7::Zero();
+  double relative_sigma = 0;  // robust standard deviation of a residual, per depth of its pair
+  std::optional<PhotoErrors> photos;  // with a frame spread
 };
 
 // Tukey's weight in [0, 1] and his loss scaled to end at 1, at 95 % efficiency.
@@ -43,13 +55,15 @@ double tukey_loss(double residual, double sigma);
 // pairs, r = J (theta + b_i - b_j), b ~ N(0, spread), and the b are marginalised: then a photo
 // counts as one witness that may err, not as thousands of independent points. Without (nullptr) the
 // pairs are independent. A pair found in both directions is the same evidence twice, so each counts
-// half. sigma is at least min_relative_sigma.
+// half. sigma is at least min_relative_sigma. Points are added as r^T information r with
+// r = moving - fixed in the same model.
 SurfaceEquations surface_equations(const std::vector<SurfacePair>& pairs,
-                                   const Eigen::Vector3d& pivot, const FrameSpread* frame_spread,
-                                   double min_relative_sigma);
+                                   std::span<const PointPair> points, const Eigen::Vector3d& pivot,
+                                   const FrameSpread* frame_spread, double min_relative_sigma);
 
 // The photos' own errors in the same model.
-PhotoErrors photo_errors(const std::vector<SurfacePair>& pairs, const Eigen::Vector3d& pivot,
-                         const FrameSpread& frame_spread, double min_relative_sigma);
+PhotoErrors photo_errors(const std::vector<SurfacePair>& pairs, std::span<const PointPair> points,
+                         const Eigen::Vector3d& pivot, const FrameSpread& frame_spread,
+                         double min_relative_sigma);
 
 }  // namespace vggtcd

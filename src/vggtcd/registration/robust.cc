@@ -11,19 +11,20 @@
 #include <span>
 
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
 #include "vggtcd/registration/constraints.h"
 #include "vggtcd/registration/frame_equations.h"
 #include "vggtcd/registration/surface_pairs.h"
+#include "vggtcd/registration/tie_weights.h"
 
 namespace vggtcd {
 namespace {
 
-// Of larger clouds every n-th point searches until the iteration has converged on those, about this
-// many; then all do, until it has converged again. The last iterations are kept for all.
+// Of larger clouds only every n-th point searches, about this many together: neighbours say the
+// same (frame_equations.cc).
 constexpr int64_t kSearchingPoints = 100'000;
-constexpr int kLastIterations = 2;
 // A step this small in standard deviations of the result ends the iteration.
 constexpr double kConvergedStep = 0.1;
 // Residuals are never believed to be smaller than this share of the depth: on data without noise
@@ -67,8 +68,12 @@ Rejected keep_static(std::vector<SurfacePair>& pairs, const RobustOptions& optio
   return all;
 }
 
-double cost_of(const std::vector<SurfacePair>& all, double relative_sigma,
-               double min_normal_cosine) {
+// The mean over both directions of the Tukey loss of the point-to-plane distance; points without a
+// compatible partner count 1.
+double surface_cost(const SurfaceMatcher& matcher, const Sim3& t2_from_t1, double relative_sigma,
+                    const RobustOptions& options) {
+  check(relative_sigma > 0, "surface_cost: positive sigma");
+  const std::vector<SurfacePair> all = matcher.pairs(t2_from_t1);
   if (all.empty()) return 1;
   const auto size = static_cast<int64_t>(all.size());
   constexpr int64_t kGrain = 1 << 14;
@@ -79,7 +84,7 @@ double cost_of(const std::vector<SurfacePair>& all, double relative_sigma,
          std::span(all).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin))) {
       // The nearest point may lie beside the surface rather than on it, by up to the voxel size;
       // what matters is the distance to its plane, and that it is not far away altogether.
-      const bool compatible = pair.normal_cosine >= min_normal_cosine;
+      const bool compatible = pair.normal_cosine >= options.min_normal_cosine;
       const double along = 0.25 * pair.distance;
       const double residual = std::max(std::abs(pair.plane_residual()), along);
       sum += compatible ? tukey_loss(residual, relative_sigma * pair.depth_u) : 1;
@@ -99,6 +104,12 @@ std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict) {
   return kNames;
 }
 
+std::span<const EnumName<CandidateCost>> enum_names(CandidateCost) {
+  static constexpr EnumName<CandidateCost> kNames[] = {{CandidateCost::kSurfaces, "surfaces"},
+                                                       {CandidateCost::kTiePoints, "tie_points"}};
+  return kNames;
+}
+
 void RobustOptions::validate() const {
   check_field(robust_grid_resolution >= 1, "robust_grid_resolution", robust_grid_resolution,
               "at least 1");
@@ -108,6 +119,8 @@ void RobustOptions::validate() const {
   check_field(prior_sigma > 0, "prior_sigma", prior_sigma, "a positive number");
   check_field(frame_sigma > 0, "frame_sigma", frame_sigma, "a positive number");
   check_field(max_iterations >= 1, "max_iterations", max_iterations, "at least 1");
+  check_field(tie_photos >= 1, "tie_photos", tie_photos, "at least 1");
+  check_field(min_ties >= 7, "min_ties", min_ties, "at least 7");
   check_field(min_pairs >= 7, "min_pairs", min_pairs, "at least 7");
 }
 
@@ -122,6 +135,16 @@ InitialUncertainty assumed_uncertainty(const RobustOptions& options, double exte
   return result;
 }
 
+// What surfaces and ties tell about the similarity: the surfaces' part of it without the noise of
+// their normals.
+Matrix7 held_information(const Matrix7& information, const std::vector<SurfacePair>& pairs,
+                         bool has_ties, const Eigen::Vector3d& pivot, const FrameSpread* spread) {
+  if (!has_ties) return without_normal_noise(information, pairs, pivot);
+  if (pairs.empty()) return information;
+  const Matrix7 of_surfaces = surface_equations(pairs, {}, pivot, spread, kSigmaFloor).information;
+  return information - of_surfaces + without_normal_noise(of_surfaces, pairs, pivot);
+}
+
 Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3f>& points) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3f& x : points) sum += x.cast<double>();
@@ -131,7 +154,7 @@ Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3f>& points) {
 }  // namespace
 
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
-                          const Sim3& initial_t2_from_t1,
+                          std::span<const TiePoint> ties, const Sim3& initial_t2_from_t1,
                           const std::optional<InitialUncertainty>& measured,
                           const RobustOptions& options) {
   options.validate();
@@ -155,106 +178,115 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   const Matrix7 prior_covariance = result.uncertainty.similarity.about(result.pivot_in_t2);
   const Matrix7 prior_information = prior_covariance.inverse();
 
+  const FrameSpread* spread = options.frame_errors ? &result.uncertainty.frame : nullptr;
   const SurfaceMatcher matcher(t1, t2, options.relative_depth ? 0 : result.extent_u);
+  if (static_cast<int64_t>(ties.size()) < options.min_ties) ties = {};
+  result.ties = static_cast<int64_t>(ties.size());
   std::vector<SurfacePair> pairs;
+  WeighedTies weighed;
+  std::optional<PhotoErrors> photos;
   Sim3 current = initial_t2_from_t1;
-  Matrix7 surface_information = Matrix7::Zero();
-  int stride = 1;
-  if (options.max_iterations > kLastIterations) {
-    const int64_t times = (result.points_t1 + result.points_t2) / kSearchingPoints;
-    stride = static_cast<int>(std::clamp<int64_t>(times, 1, 1000));
-  }
+  Vector7 step = Vector7::Zero();
+  SurfaceEquations equations;
+  const int64_t times = (result.points_t1 + result.points_t2) / kSearchingPoints;
+  const int stride = static_cast<int>(std::clamp<int64_t>(times, 1, 1000));
+  bool searching = ties.empty();  // ties need no search: until they have converged they go alone
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    matcher.pairs(current, options.both_directions, stride, pairs);
-    const Rejected rejected = keep_static(pairs, options);
-    result.pairs = static_cast<int64_t>(pairs.size());
-    result.rejected_far = rejected.far;
-    result.rejected_normal = rejected.normal;
-    if (result.pairs < options.min_pairs && stride > 1) {
-      stride = 1;
-      continue;
+    if (searching) {
+      matcher.pairs(current, options.both_directions, stride, pairs);
+      const Rejected rejected = keep_static(pairs, options);
+      result.pairs = static_cast<int64_t>(pairs.size());
+      result.rejected_far = rejected.far;
+      result.rejected_normal = rejected.normal;
+      if (result.pairs < options.min_pairs && ties.empty()) {
+        result.explanation = fmt::format(
+            "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
+            "refinement needs.",
+            result.pairs, options.min_pairs);
+        return result;
+      }
     }
-    if (result.pairs < options.min_pairs) {
-      result.explanation = fmt::format(
-          "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
-          "refinement needs.",
-          result.pairs, options.min_pairs);
-      return result;
-    }
-    const SurfaceEquations surface =
-        surface_equations(pairs, result.pivot_in_t2,
-                          options.frame_errors ? &result.uncertainty.frame : nullptr, kSigmaFloor);
-    result.relative_sigma = surface.relative_sigma;
-    surface_information = surface.information;
+    weighed = weigh_ties(ties, current, photos ? &*photos : nullptr, step);
+    equations = surface_equations(pairs, weighed.points, result.pivot_in_t2, spread, kSigmaFloor);
+    photos = equations.photos;
 
     // The prior's residual is what separates the current from the initial similarity.
     const Vector7 from_initial =
         similarity_parameters(current * initial_t2_from_t1.inverse(), result.pivot_in_t2);
-    const Matrix7 information = surface.information + prior_information;
-    const Vector7 slope = surface.gradient + prior_information * from_initial;
-    const Vector7 step = -information.ldlt().solve(slope);
+    const Matrix7 information = equations.information + prior_information;
+    const Vector7 slope = equations.gradient + prior_information * from_initial;
+    step = -information.ldlt().solve(slope);
     current = small_similarity(step, result.pivot_in_t2) * current;
     const bool small = step.dot(information * step) < kConvergedStep * kConvergedStep;
-    result.converged = small && stride == 1;
-    if (small || result.iterations + kLastIterations >= options.max_iterations) stride = 1;
+    result.converged = small && searching;
+    searching = searching || small || result.iterations >= options.max_iterations / 2;
   }
+  result.relative_sigma = equations.relative_sigma;
+  result.ties_used = weighed.used;
   result.residual_sigma_u = result.relative_sigma * median_over(pairs, [](const SurfacePair& pair) {
                               return pair.depth_u;
                             });
-  const Constraints constraints =
-      constraints_of(without_normal_noise(surface_information, pairs, result.pivot_in_t2),
-                     prior_covariance, result.pivot_in_t2);
+  const Constraints constraints = constraints_of(
+      held_information(equations.information, pairs, !ties.empty(), result.pivot_in_t2, spread),
+      prior_covariance, result.pivot_in_t2);
   result.covariance = constraints.covariance;
   result.constrained_share = constraints.constrained_share;
   result.open_degrees_of_freedom = constraints.open_degrees_of_freedom;
   result.open_motions = constraints.open_motions;
 
+  result.compared_by = ties.empty() ? CandidateCost::kSurfaces : CandidateCost::kTiePoints;
+  result.tie_variance = weigh_ties(ties, current, nullptr, step).variance;
   const auto cost_at = [&](const Sim3& t2_from_t1) {
-    matcher.pairs(t2_from_t1, true, 1, pairs);
-    return cost_of(pairs, result.relative_sigma, options.min_normal_cosine);
+    return ties.empty() ? surface_cost(matcher, t2_from_t1, result.relative_sigma, options)
+                        : tie_cost(ties, t2_from_t1, result.tie_variance);
   };
   result.cost_initial = cost_at(initial_t2_from_t1);
   result.cost_final = cost_at(current);
   if (result.cost_final >= result.cost_initial) {
     result.verdict = RobustVerdict::kKeptInitialNotBetter;
     result.explanation = fmt::format(
-        "Kept the initial alignment: the refined one does not fit the static surfaces better (cost "
-        "{:.4g} before, {:.4g} after).",
-        result.cost_initial, result.cost_final);
+        "Kept the initial alignment: the refined one does not fit the {} better (cost {:.4g} "
+        "before, {:.4g} after).",
+        ties.empty() ? "static surfaces" : "tie points", result.cost_initial, result.cost_final);
     return result;
   }
   result.verdict = RobustVerdict::kRefined;
   result.t2_from_t1 = current;
   if (options.camera_fit && options.frame_errors) {
-    // The cost left the pairs at `current`, in both directions.
-    if (!options.both_directions) matcher.pairs(current, false, 1, pairs);
+    matcher.pairs(current, options.both_directions, stride, pairs);
     keep_static(pairs, options);
-    const PhotoErrors photos =
-        photo_errors(pairs, result.pivot_in_t2, result.uncertainty.frame, kSigmaFloor);
+    weighed = weigh_ties(ties, current, &*photos, step);
+    const PhotoErrors errors =
+        photo_errors(pairs, weighed.points, result.pivot_in_t2, *spread, kSigmaFloor);
     std::vector<Eigen::Vector3d> cameras_t1 = t1.cameras;
     for (Eigen::Vector3d& camera : cameras_t1) camera = current * camera;
     const CameraFit fit =
-        fit_cameras(photos, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance);
+        fit_cameras(errors, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance);
     result.t2_from_t1 = small_similarity(fit.step, result.pivot_in_t2) * current;
-    result.covariance = fit.covariance;
+    result.covariance = fit.covariance + fit.bend;
   }
   result.explanation = fmt::format(
-      "Refined rotation, translation and scale on {} static surface pairs; they fit to {:.3g}.",
-      result.pairs, result.residual_sigma_u);
+      "Refined rotation, translation and scale on {} static surface pairs, which fit to {:.3g}, "
+      "{}.",
+      result.pairs, result.residual_sigma_u,
+      ties.empty() ? "without tie points" : fmt::format("and {} tie points", result.ties_used));
   if (!result.open_motions.empty()) {
     result.explanation += fmt::format(
-        " Held by the initial alignment only, not by static surfaces: {} (in the T2 frame).",
+        " Held by the initial alignment only, not by what is static: {} (in the T2 frame).",
         fmt::join(result.open_motions, "; "));
   }
   return result;
 }
 
-double surface_cost(const OrientedPoints& t1, const OrientedPoints& t2, const Sim3& t2_from_t1,
-                    const RobustResult& scale, const RobustOptions& options) {
-  check(scale.relative_sigma > 0, "surface_cost: positive sigma");
+double candidate_cost(const OrientedPoints& t1, const OrientedPoints& t2,
+                      std::span<const TiePoint> ties, const Sim3& t2_from_t1,
+                      const RobustResult& scale, const RobustOptions& options) {
+  if (scale.compared_by == CandidateCost::kTiePoints) {
+    return tie_cost(ties, t2_from_t1, scale.tie_variance);
+  }
   const SurfaceMatcher matcher(t1, t2, options.relative_depth ? 0 : scale.extent_u);
-  return cost_of(matcher.pairs(t2_from_t1), scale.relative_sigma, options.min_normal_cosine);
+  return surface_cost(matcher, t2_from_t1, scale.relative_sigma, options);
 }
 
 }  // namespace vggtcd

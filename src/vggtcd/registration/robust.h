@@ -14,6 +14,7 @@
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/registration/initial_uncertainty.h"
 #include "vggtcd/registration/small_similarity.h"
+#include "vggtcd/registration/tie_points.h"
 #include "vggtcd/scene/oriented_points.h"
 
 namespace vggtcd {
@@ -26,11 +27,14 @@ struct RobustOptions {
   bool measured_uncertainty = true;  // of the initial similarity and of a photo, from the keyframes
   bool frame_errors = true;          // a photo errs as a whole; false: points are independent
   bool relative_depth = true;        // errors grow with the distance from the camera
+  bool tie_points = true;            // what photos of both epochs show alike (tie_points.h)
+  int tie_photos = 24;               // of each epoch that are searched for them; >= 1
   bool camera_fit = true;            // carry the cameras, not only the surfaces (camera_fit.h)
   // Where nothing is measured: rotation (rad), log scale, translation / extent.
   double prior_sigma = 0.02;   // of the initial similarity; > 0
   double frame_sigma = 0.002;  // of one photo; > 0
   int max_iterations = 30;     // >= 1
+  int64_t min_ties = 50;       // fewer tie points are not looked at; >= 7
   int64_t min_pairs = 200;     // fewer gated pairs keep the initial similarity; >= 7
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
@@ -53,6 +57,12 @@ struct RobustOptions {
         "relative_depth", self.relative_depth,
         "Robust: points err in proportion to their distance from the camera, in the joint pass as "
         "on the surfaces; else all points alike.");
+    field("tie_points", self.tie_points,
+          "Robust: places that photos of both epochs show alike hold the alignment besides the "
+          "surfaces.");
+    field("tie_photos", self.tie_photos,
+          "Robust: photos of each epoch that are searched for such places.");
+    field("min_ties", self.min_ties, "Robust: fewer of them are taken for chance.");
     field("camera_fit", self.camera_fit,
           "Robust: the similarity that carries the cameras, by what their photos show, is the "
           "result; else the one that fits the surfaces. Needs frame-errors.");
@@ -74,6 +84,9 @@ enum class RobustVerdict {
   kKeptInitialNotBetter,  // the robust cost did not fall
 };
 std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict);
+
+enum class CandidateCost { kSurfaces, kTiePoints };
+std::span<const EnumName<CandidateCost>> enum_names(CandidateCost);
 
 struct RobustResult {
   Sim3 t2_from_t1;  // carries the cameras, if asked for (camera_fit); else fits the surfaces
@@ -100,10 +113,13 @@ struct RobustResult {
   // Robust standard deviation of the point-to-plane residuals at the median depth, and per depth of
   // the pair, which is what they are weighed by.
   double residual_sigma_u = 0, relative_sigma = 0;
-  InitialUncertainty uncertainty;  // what was assumed or measured beforehand
+  int64_t ties = 0, ties_used = 0;  // tie points, and those that are not outliers
+  InitialUncertainty uncertainty;   // what was assumed or measured beforehand
   bool uncertainty_measured = false;
-  bool converged = false;  // the last step was below a tenth of a standard deviation
-  double cost_initial = 0, cost_final = 0;  // surface_cost of the surfaces' similarity
+  CandidateCost compared_by = CandidateCost::kSurfaces;
+  double tie_variance = 0;  // of the ties' distances without what photos' own errors explain
+  bool converged = false;   // the last step was below a tenth of a standard deviation
+  double cost_initial = 0, cost_final = 0;  // candidate_cost of the start and the surfaces' fit
 };
 
 // Gauss-Newton on r = n . (T x - y), whose deviation grows with depth, over the nearest pairs,
@@ -112,15 +128,15 @@ struct RobustResult {
 // what the coarse stage knows about itself (coarse_uncertainty); without it prior_sigma and
 // frame_sigma stand in.
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
-                          const Sim3& initial_t2_from_t1,
+                          std::span<const TiePoint> ties, const Sim3& initial_t2_from_t1,
                           const std::optional<InitialUncertainty>& measured,
                           const RobustOptions& options);
 
-// What candidates are compared by, and what align_robust minimises but for the prior and the
-// photos' own errors: the mean over both directions of the Tukey loss (0 to 1) of the
-// point-to-plane distance at the scale that `scale` found; points without a compatible partner
-// count 1.
-double surface_cost(const OrientedPoints& t1, const OrientedPoints& t2, const Sim3& t2_from_t1,
-                    const RobustResult& scale, const RobustOptions& options);
+// What candidates are compared by, 0 to 1: of tie points the mean Tukey loss of their distances
+// (tie_cost); without them that of the point-to-plane distances of both directions, where points
+// without a compatible partner count 1. `scale` is what align_robust found out about both.
+double candidate_cost(const OrientedPoints& t1, const OrientedPoints& t2,
+                      std::span<const TiePoint> ties, const Sim3& t2_from_t1,
+                      const RobustResult& scale, const RobustOptions& options);
 
 }  // namespace vggtcd

@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "tests/support/toy_scene.h"
 #include "vggtcd/core/parallel.h"
@@ -47,7 +49,7 @@ TEST(OrientedPoints, NormalsOfAPlaneFaceTheCameras) {
 
 TEST(AlignRobust, RemovesAnErrorInAllSevenParameters) {
   const RobustResult result =
-      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), kError, {}, {});
+      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, kError, {}, {});
   EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
   EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
   EXPECT_LT(result.cost_final, result.cost_initial);
@@ -56,10 +58,10 @@ TEST(AlignRobust, RemovesAnErrorInAllSevenParameters) {
 TEST(AlignRobust, HasTheSameBitsForAnyNumberOfThreads) {
   const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps_and_box, 0.13);
   set_num_threads(1);
-  const RobustResult expected = align_robust(t1, t2, kError, {}, {});
+  const RobustResult expected = align_robust(t1, t2, {}, kError, {}, {});
   for (const int threads : {2, 5}) {
     set_num_threads(threads);
-    const RobustResult result = align_robust(t1, t2, kError, {}, {});
+    const RobustResult result = align_robust(t1, t2, {}, kError, {}, {});
     EXPECT_EQ(result.t2_from_t1.rotation, expected.t2_from_t1.rotation);
     EXPECT_EQ(result.t2_from_t1.translation, expected.t2_from_t1.translation);
     EXPECT_EQ(result.t2_from_t1.scale, expected.t2_from_t1.scale);
@@ -81,13 +83,14 @@ OrientedPoints repeated(const OrientedPoints& points, size_t size) {
   return result;
 }
 
-TEST(AlignRobust, OfLargeCloudsGoesByAPartAndEndsOnAllPoints) {
+TEST(AlignRobust, OfLargeCloudsEveryNthPointSearches) {
   const OrientedPoints t1 = repeated(points_of(bumps, 0), 120'000);
   const OrientedPoints t2 = repeated(points_of(bumps, 0.13), 120'000);
-  const RobustResult result = align_robust(t1, t2, kError, {}, {});
+  const RobustResult result = align_robust(t1, t2, {}, kError, {}, {});
   EXPECT_TRUE(result.converged);
-  EXPECT_EQ(result.pairs + result.rejected_far + result.rejected_normal,
-            static_cast<int64_t>(t1.size() + t2.size()));
+  const auto all = static_cast<int64_t>(t1.size() + t2.size());
+  EXPECT_NEAR(static_cast<double>(result.pairs + result.rejected_far + result.rejected_normal),
+              static_cast<double>(all / (all / 100'000)), 1);
   EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
 }
 
@@ -109,7 +112,7 @@ TEST(SurfaceMatcher, EveryNthPointFindsWhatItFindsAmongAll) {
 
 TEST(AlignRobust, IsNotDrawnByAChange) {
   const RobustResult result =
-      align_robust(points_of(bumps, 0), points_of(bumps_and_box, 0.13), kError, {}, {});
+      align_robust(points_of(bumps, 0), points_of(bumps_and_box, 0.13), {}, kError, {}, {});
   EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
   EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.15 * difference(kError, {}).norm());
   EXPECT_GT(result.rejected_far, 0);
@@ -118,7 +121,7 @@ TEST(AlignRobust, IsNotDrawnByAChange) {
 TEST(AlignRobust, SaysThatAPlaneLeavesFourDirectionsOpen) {
   const auto flat = [](double, double) { return 0.0; };
   const RobustResult result =
-      align_robust(points_of(flat, 0), points_of(flat, 0.13), kError, {}, {});
+      align_robust(points_of(flat, 0), points_of(flat, 0.13), {}, kError, {}, {});
   // Sliding in the plane (2), turning in it, and scaling within it.
   EXPECT_EQ(result.open_degrees_of_freedom, 4);
   EXPECT_LT(result.constrained_share[3], 0.1);  // translation x
@@ -129,8 +132,58 @@ TEST(AlignRobust, SaysThatAPlaneLeavesFourDirectionsOpen) {
   EXPECT_NEAR(difference(result.t2_from_t1, {})[5], 0, 2e-3);
 }
 
+// Places on the plane z = 5 that every photo shows, `shift` apart along x, with noise that their
+// covariances promise.
+std::vector<TiePoint> ties_on_the_plane(int count, double shift) {
+  constexpr double kSigma = 0.002;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> place(-1.5, 1.5);
+  std::normal_distribution<double> noise(0, kSigma);
+  std::vector<TiePoint> ties;
+  for (int i = 0; i < count; ++i) {
+    TiePoint& tie = ties.emplace_back();
+    tie.frame_t1 = i % 5;
+    tie.frame_t2 = (i / 5) % 5;
+    tie.in_t1 = {place(random), place(random), 5};
+    tie.in_t2 = tie.in_t1 + Eigen::Vector3d(shift + noise(random), noise(random), noise(random));
+    tie.covariance_t1 = tie.covariance_t2 = 0.5 * kSigma * kSigma * Eigen::Matrix3d::Identity();
+  }
+  return ties;
+}
+
+TEST(AlignRobust, TiePointsHoldWhatAPlaneLeavesOpen) {
+  const auto flat = [](double, double) { return 0.0; };
+  const OrientedPoints t1 = points_of(flat, 0), t2 = points_of(flat, 0.13);
+  const RobustResult result = align_robust(t1, t2, ties_on_the_plane(400, 0), kError, {}, {});
+  EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
+  EXPECT_EQ(result.compared_by, CandidateCost::kTiePoints);
+  EXPECT_THAT(result.open_motions, testing::IsEmpty());
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
+}
+
+TEST(AlignRobust, AFewTiesOnWhatMovedDoNotDrawIt) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  std::vector<TiePoint> ties = ties_on_the_plane(400, 0);
+  const std::vector<TiePoint> moved = ties_on_the_plane(120, 0.3);
+  ties.insert(ties.end(), moved.begin(), moved.end());
+  const RobustResult result = align_robust(t1, t2, ties, kError, {}, {});
+  EXPECT_LE(result.ties_used, 400);
+  EXPECT_GT(result.ties_used, 350);
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
+}
+
+TEST(AlignRobust, TooFewTiesAreChance) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  const RobustResult without = align_robust(t1, t2, {}, kError, {}, {});
+  const RobustResult result = align_robust(t1, t2, ties_on_the_plane(49, 0.3), kError, {}, {});
+  EXPECT_EQ(result.ties, 0);
+  EXPECT_EQ(result.compared_by, CandidateCost::kSurfaces);
+  EXPECT_EQ(result.t2_from_t1.translation, without.t2_from_t1.translation);
+}
+
 TEST(AlignRobust, ConstrainsEverythingOnARelief) {
-  const RobustResult result = align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, {}, {});
+  const RobustResult result =
+      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, {}, {}, {});
   EXPECT_THAT(result.open_motions, testing::IsEmpty());
   EXPECT_GT(result.constrained_share.minCoeff(), 0.5);
   EXPECT_GT(result.covariance.diagonal().minCoeff(), 0);
@@ -140,13 +193,13 @@ TEST(AlignRobust, KeepsTheInitialAlignmentWithTooFewPairs) {
   RobustOptions options;
   options.min_pairs = 1'000'000;
   const RobustResult result =
-      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), kError, {}, options);
+      align_robust(points_of(bumps, 0), points_of(bumps, 0.13), {}, kError, {}, options);
   EXPECT_EQ(result.verdict, RobustVerdict::kKeptInitialFewPairs);
   EXPECT_EQ(result.t2_from_t1.translation, kError.translation);
 }
 
 TEST(AlignRobust, EmptyCloudsKeepTheInitialAlignment) {
-  EXPECT_EQ(align_robust({}, {}, kError, {}, {}).verdict, RobustVerdict::kKeptInitialFewPairs);
+  EXPECT_EQ(align_robust({}, {}, {}, kError, {}, {}).verdict, RobustVerdict::kKeptInitialFewPairs);
 }
 
 TEST(RobustOptions, RefuseANormalGateOfOne) {

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vggtcd/reconstruction/features.h"
+#include "vggtcd/features/features.h"
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "vggtcd/core/parallel.h"
@@ -74,6 +75,36 @@ TEST(MatchDescriptors, FindsWhatTheDefinitionFinds) {
   EXPECT_EQ(found, expected);
 }
 
+TEST(MatchDescriptorsNear, ComparesOnlyWhatLiesWhereItIsExpected) {
+  Features a = random_features(30, 1), b = random_features(30, 2);
+  b.descriptors = a.descriptors;  // each has its own twin, and all points lie at the origin
+  constexpr float kNowhere = std::numeric_limits<float>::quiet_NaN();
+  std::vector<Eigen::Vector2f> of_a(30, {kNowhere, kNowhere}), of_b = of_a;
+  EXPECT_TRUE(match_descriptors_near(a, b, of_a, of_b, 5).empty());
+  of_a[7] = {3, 3.9f};   // 4.9 px away
+  of_b[8] = {-3, 3.9f};  // expected from the other side
+  of_a[9] = {3, 4.1f};   // 5.1
+  const auto matches = match_descriptors_near(a, b, of_a, of_b, 5);
+  ASSERT_EQ(matches.size(), 2u);
+  EXPECT_EQ(matches[0].first, 7);
+  EXPECT_EQ(matches[0].second, 7);
+  EXPECT_EQ(matches[1].first, 8);
+}
+
+TEST(MatchDescriptorsNear, FindsTheSameAsMatchDescriptorsWithinReachOfAll) {
+  Features a = random_features(61, 1), b = random_features(83, 2);
+  std::copy_n(a.descriptors.begin(), 40 * kDescriptorSize, b.descriptors.begin());
+  const std::vector<Eigen::Vector2f> of_a(61, {0, 0}), of_b(83, {0, 0});
+  const auto expected = match_descriptors(a, b);
+  const auto actual = match_descriptors_near(a, b, of_a, of_b, 1);
+  ASSERT_GE(expected.size(), 40u);
+  ASSERT_EQ(actual.size(), expected.size());
+  for (size_t i = 0; i < actual.size(); ++i) {
+    EXPECT_EQ(actual[i].first, expected[i].first);
+    EXPECT_EQ(actual[i].second, expected[i].second);
+  }
+}
+
 TEST(MatchDescriptors, FindsNothingInAnEmptyPhoto) {
   EXPECT_TRUE(match_descriptors(random_features(5, 1), Features{}).empty());
   EXPECT_TRUE(match_descriptors(Features{}, random_features(5, 1)).empty());
@@ -126,6 +157,20 @@ TEST(MatchAll, FindsTheShiftOfAWallAndThatItIsAPlaneWithTheSameBitsForAnyThreads
       EXPECT_EQ(found[0][i].matches[k].second, found[1][i].matches[k].second);
     }
   }
+}
+
+TEST(ExtractFeatures, OfAShrunkPhotoHasItsKeyPointsInTheOriginalsPixels) {
+  const Image photo = wall(0, 0);
+  const Features full = extract_features(photo, 5000), shrunk = extract_features(photo, 5000, 160);
+  ASSERT_GT(shrunk.points.size(), 20u);
+  size_t found = 0;
+  for (const KeyPoint& p : shrunk.points) {
+    found += std::any_of(full.points.begin(), full.points.end(), [&](const KeyPoint& q) {
+      return std::hypot(p.u_px - q.u_px, p.v_px - q.v_px) < 0.7f &&
+             std::abs(std::log(p.scale_px / q.scale_px)) < 0.3f;
+    });
+  }
+  EXPECT_GT(found, shrunk.points.size() * 6 / 10) << shrunk.points.size();
 }
 
 }  // namespace

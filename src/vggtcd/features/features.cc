@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sparse correspondences between photos: SIFT (Lowe 2004) with root descriptors (Arandjelovic and
 // Zisserman 2012), ratio test, and RANSAC, both from OpenCV.
-#include "vggtcd/reconstruction/features.h"
+#include "vggtcd/features/features.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 
 namespace vggtcd {
@@ -37,12 +38,17 @@ void append_root_descriptor(const float* sift, std::vector<int16_t>& out) {
   }
 }
 
-Features extract(const Image& photo, int max_points) {
+}  // namespace
+
+Features extract_features(const Image& photo, int max_points, int max_side_px) {
   constexpr double kContrast = 0.02, kEdge = 10, kSigma = 1.6;
   std::vector<cv::KeyPoint> points;
   cv::Mat descriptors;
   const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, kContrast, kEdge, kSigma);
-  const cv::Mat gray = gray_of(photo);
+  cv::Mat gray = gray_of(photo);
+  const float shrink = std::min(
+      1.0f, static_cast<float>(max_side_px) / static_cast<float>(std::max(gray.cols, gray.rows)));
+  if (shrink < 1) cv::resize(gray, gray, {}, shrink, shrink, cv::INTER_AREA);
   sift->detect(gray, points);
   // The largest, not the strongest: they are found again from farther away.
   std::stable_sort(points.begin(), points.end(),
@@ -53,12 +59,15 @@ Features extract(const Image& photo, int max_points) {
   Features features;
   for (size_t i = 0; i < points.size(); ++i) {
     const cv::KeyPoint& p = points[i];
-    features.points.push_back(
-        {p.pt.x, p.pt.y, p.size, static_cast<float>(p.angle * CV_PI / 180.0)});
+    // Pixel centres are integers: those of the two sizes meet at the corner, half a pixel before 0.
+    features.points.push_back({(p.pt.x + 0.5f) / shrink - 0.5f, (p.pt.y + 0.5f) / shrink - 0.5f,
+                               p.size / shrink, static_cast<float>(p.angle * CV_PI / 180.0)});
     append_root_descriptor(descriptors.ptr<float>(static_cast<int>(i)), features.descriptors);
   }
   return features;
 }
+
+namespace {
 
 int32_t dot(const int16_t* a, const int16_t* b) {
   int32_t sum = 0;
@@ -86,6 +95,19 @@ struct Nearest {
     return index >= 0 && angle(best) < kMaxAngleRad && angle(best) < kMaxRatio * angle(second);
   }
 };
+
+std::vector<Match> mutual(const std::vector<Nearest>& of_first,
+                          const std::vector<Nearest>& of_second) {
+  std::vector<Match> matches;
+  for (size_t i = 0; i < of_first.size(); ++i) {
+    if (!of_first[i].distinct()) continue;
+    const Nearest& back = of_second[static_cast<size_t>(of_first[i].index)];
+    if (back.index == static_cast<int32_t>(i) && back.distinct()) {
+      matches.push_back({static_cast<int32_t>(i), of_first[i].index});
+    }
+  }
+  return matches;
+}
 
 PhotoPair verified(int first, int second, const std::vector<Features>& features,
                    const std::vector<Match>& matches, int min_inliers) {
@@ -124,7 +146,7 @@ PhotoPair verified(int first, int second, const std::vector<Features>& features,
 }  // namespace
 
 std::vector<Features> extract_features(const std::vector<Image>& photos, int max_points,
-                                       ProgressStage& stage) {
+                                       ProgressStage& stage, int max_side_px) {
   cv::setNumThreads(1);  // we are parallel over photos; OpenCV's threads would race for the order
   std::vector<Features> features(photos.size());
   const auto count = static_cast<int64_t>(photos.size());
@@ -132,7 +154,8 @@ std::vector<Features> extract_features(const std::vector<Image>& photos, int max
   for (int64_t begin = 0; begin < count; begin += slab) {
     parallel_for(std::min(slab, count - begin), 1, [&](int64_t from, int64_t to) {
       for (int64_t i = begin + from; i < begin + to; ++i) {
-        features[static_cast<size_t>(i)] = extract(photos[static_cast<size_t>(i)], max_points);
+        features[static_cast<size_t>(i)] =
+            extract_features(photos[static_cast<size_t>(i)], max_points, max_side_px);
       }
     });
     stage.advance(static_cast<double>(begin + slab) / static_cast<double>(count));
@@ -154,15 +177,34 @@ std::vector<Match> match_descriptors(const Features& first, const Features& seco
       }
     }
   }
-  std::vector<Match> matches;
-  for (size_t i = 0; i < n; ++i) {
-    if (!of_first[i].distinct()) continue;
-    const Nearest& back = of_second[static_cast<size_t>(of_first[i].index)];
-    if (back.index == static_cast<int32_t>(i) && back.distinct()) {
-      matches.push_back({static_cast<int32_t>(i), of_first[i].index});
+  return mutual(of_first, of_second);
+}
+
+std::vector<Match> match_descriptors_near(const Features& first, const Features& second,
+                                          std::span<const Eigen::Vector2f> expected_of_first,
+                                          std::span<const Eigen::Vector2f> expected_of_second,
+                                          float radius_px) {
+  check(expected_of_first.size() == first.points.size() &&
+            expected_of_second.size() == second.points.size(),
+        "match_descriptors_near: one expected pixel per key point");
+  const auto near = [&](const Eigen::Vector2f& expected, const KeyPoint& point) {
+    return (expected - Eigen::Vector2f(point.u_px, point.v_px)).squaredNorm() <
+           radius_px * radius_px;  // false for NaN
+  };
+  std::vector<Nearest> of_first(first.points.size()), of_second(second.points.size());
+  for (size_t i = 0; i < of_first.size(); ++i) {
+    for (size_t j = 0; j < of_second.size(); ++j) {
+      if (!near(expected_of_first[i], second.points[j]) &&
+          !near(expected_of_second[j], first.points[i])) {
+        continue;
+      }
+      const int32_t product = dot(first.descriptors.data() + i * kDescriptorSize,
+                                  second.descriptors.data() + j * kDescriptorSize);
+      of_first[i].see(product, static_cast<int32_t>(j));
+      of_second[j].see(product, static_cast<int32_t>(i));
     }
   }
-  return matches;
+  return mutual(of_first, of_second);
 }
 
 std::vector<PhotoPair> match_all(const std::vector<Features>& features, int min_inliers,

@@ -5,7 +5,10 @@
 // bytes every time.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <limits>
+#include <span>
 #include <vector>
 
 #include "vggtcd/core/progress.h"
@@ -36,13 +39,26 @@ struct PhotoPair {
   int homography_inliers = 0;  // of them, those that one homography explains as well
 };
 
-// At most max_points strongest SIFT key points of each photo.
+// At most max_points largest SIFT key points of a photo, which is shrunk before so that its longer
+// side has at most max_side_px; key points are in its own pixels.
+Features extract_features(const Image& photo, int max_points,
+                          int max_side_px = std::numeric_limits<int>::max());
+
+// The same of each photo, in parallel.
 std::vector<Features> extract_features(const std::vector<Image>& photos, int max_points,
-                                       ProgressStage& stage);
+                                       ProgressStage& stage,
+                                       int max_side_px = std::numeric_limits<int>::max());
 
 // Mutual nearest neighbours whose distance (angle between descriptors) is below 0.8 of the distance
 // to the second nearest.
 std::vector<Match> match_descriptors(const Features& first, const Features& second);
+
+// The same among key points that lie within radius_px of where the other one is expected, from
+// either side: expected_of_first[i] is the pixel in the second photo (NaN: nowhere).
+std::vector<Match> match_descriptors_near(const Features& first, const Features& second,
+                                          std::span<const Eigen::Vector2f> expected_of_first,
+                                          std::span<const Eigen::Vector2f> expected_of_second,
+                                          float radius_px);
 
 // Every pair of photos with at least min_inliers matches within 4 px of their epipolar lines.
 std::vector<PhotoPair> match_all(const std::vector<Features>& features, int min_inliers,

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// How much each tie point counts under a similarity, and how well a similarity fits them.
+#include "vggtcd/registration/tie_weights.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "vggtcd/core/error.h"
+#include "vggtcd/geometry/order_statistics.h"
+
+namespace vggtcd {
+namespace {
+
+constexpr double kMedianOfChiSquared3 = 2.366;
+// Ties are never believed to be better than half of the deviation they promise.
+constexpr double kLeastVariance = 0.25;
+// Tukey's constant is for one residual; three reach farther at the same efficiency.
+constexpr double kTukeyWidening = 1.225;
+
+PointPair under(const TiePoint& tie, const Sim3& t2_from_t1) {
+  const Eigen::Matrix3d axes = t2_from_t1.scale * t2_from_t1.rotation;
+  return {t2_from_t1 * tie.in_t1, tie.in_t2,
+          (axes * tie.covariance_t1 * axes.transpose() + tie.covariance_t2).inverse(), tie.frame_t1,
+          tie.frame_t2};
+}
+
+double squared_distance(const PointPair& point, const Eigen::Vector3d& difference) {
+  return difference.dot(point.information * difference);
+}
+
+double width(double variance) { return kTukeyWidening * std::sqrt(variance); }
+
+}  // namespace
+
+WeighedTies weigh_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1,
+                       const PhotoErrors* photos, const Vector7& theta) {
+  WeighedTies result;
+  if (ties.empty()) return result;
+  std::vector<double> distances;  // squared
+  for (const TiePoint& tie : ties) {
+    const PointPair& point = result.points.emplace_back(under(tie, t2_from_t1));
+    Eigen::Vector3d difference = point.moving - point.fixed;
+    if (photos) difference += photos->displacement(point, theta);
+    distances.push_back(squared_distance(point, difference));
+  }
+  result.variance = std::max(middle_of(distances) / kMedianOfChiSquared3, kLeastVariance);
+  for (size_t i = 0; i < ties.size(); ++i) {
+    const double weight = tukey_weight(std::sqrt(distances[i]), width(result.variance));
+    result.points[i].information *= weight / result.variance;
+    result.used += weight > 0 ? 1 : 0;
+  }
+  return result;
+}
+
+double tie_cost(std::span<const TiePoint> ties, const Sim3& t2_from_t1, double variance) {
+  check(!ties.empty() && variance > 0, "tie_cost: ties and a positive variance");
+  double sum = 0;
+  for (const TiePoint& tie : ties) {
+    const PointPair point = under(tie, t2_from_t1);
+    sum +=
+        tukey_loss(std::sqrt(squared_distance(point, point.moving - point.fixed)), width(variance));
+  }
+  return sum / static_cast<double>(ties.size());
+}
+
+}  // namespace vggtcd
