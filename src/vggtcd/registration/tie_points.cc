@@ -26,7 +26,8 @@ constexpr double kSearchShare = 0.08;   // of the photo's width: how far off a k
 constexpr double kMinConfidence = 15;   // percentile
 constexpr float kMaxDepthStep = 0.06f;  // within 3 x 3 pixels, of the depth: another surface
 constexpr double kKeyPointSigma_px = 0.7;
-constexpr double kDepthSigma = 0.02;  // of a network's depth, of the depth itself
+constexpr double kDepthSigma =
+    0.05;  // far along a ray, of the depth: ties go by what is seen, not by it
 
 // A key point in space: its pixel, depth and place in the epoch's frame.
 struct Lifted {

@@ -30,6 +30,15 @@ Reconstruction epoch(double camera_offset, const Sim3& frame_from_scene,
                                       frame_from_scene);
 }
 
+const Reconstruction& textured_before() {
+  static const Reconstruction reconstruction = epoch(0, Sim3{});
+  return reconstruction;
+}
+const Reconstruction& textured_after() {
+  static const Reconstruction reconstruction = epoch(0.13, kT2FromT1);
+  return reconstruction;
+}
+
 // Off by about five pixels.
 Sim3 nearly() {
   const Vector7 error = (Vector7() << 0.01, -0.01, 0.02, 0.05, 0.03, 0.04, 0.01).finished();
@@ -44,8 +53,7 @@ size_t number_of_true(const std::vector<TiePoint>& ties) {
 }
 
 TEST(FindTiePoints, FindsPlacesThatBothEpochsShow) {
-  const Reconstruction before = epoch(0, Sim3{}), after = epoch(0.13, kT2FromT1);
-  const auto ties = find_tie_points(before, after, nearly(), 5);
+  const auto ties = find_tie_points(textured_before(), textured_after(), nearly(), 5);
   EXPECT_GT(ties.size(), 200u);
   EXPECT_GT(number_of_true(ties), ties.size() * 9 / 10);
   for (const TiePoint& tie : ties) {
@@ -57,7 +65,7 @@ TEST(FindTiePoints, FindsThemInAnotherLight) {
   const auto dim = [](double x, double y) {
     return static_cast<uint8_t>(0.5 * testing_support::mottled(x, y) + 15);
   };
-  const auto ties = find_tie_points(epoch(0, Sim3{}), epoch(0.13, kT2FromT1, dim), nearly(), 5);
+  const auto ties = find_tie_points(textured_before(), epoch(0.13, kT2FromT1, dim), nearly(), 5);
   EXPECT_GT(ties.size(), 100u);
   EXPECT_GT(number_of_true(ties), ties.size() * 9 / 10);
 }
@@ -69,7 +77,7 @@ TEST(FindTiePoints, FindsNoneOnABlankWall) {
 }
 
 TEST(FindTiePoints, LooksAtNoMorePhotosThanAskedFor) {
-  const auto ties = find_tie_points(epoch(0, Sim3{}), epoch(0.13, kT2FromT1), nearly(), 2);
+  const auto ties = find_tie_points(textured_before(), textured_after(), nearly(), 2);
   ASSERT_FALSE(ties.empty());
   for (const TiePoint& tie : ties) {  // the first and the last
     EXPECT_EQ(tie.frame_t1 % 4, 0);
@@ -78,33 +86,32 @@ TEST(FindTiePoints, LooksAtNoMorePhotosThanAskedFor) {
 }
 
 TEST(FindTiePoints, PixelsAreSurerThanDepths) {
-  const Reconstruction before = epoch(0, Sim3{});
-  for (const TiePoint& tie : find_tie_points(before, epoch(0.13, kT2FromT1), nearly(), 5)) {
+  const Reconstruction& before = textured_before();
+  for (const TiePoint& tie : find_tie_points(before, textured_after(), nearly(), 5)) {
     const Eigen::Vector3d ray =
         tie.in_t1 -
         camera_center(before.views[static_cast<size_t>(tie.frame_t1)].camera_from_world);
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(tie.covariance_t1);
     EXPECT_GT(std::abs(axes.eigenvectors().col(2).dot(ray.normalized())), 1 - 1e-9);
-    // 2 % of the distance along the ray; 0.7 px across it.
-    EXPECT_NEAR(std::sqrt(axes.eigenvalues()[2]) / ray.norm(), 0.02, 1e-9);
+    // 5 % of the distance along the ray; 0.7 px across it.
+    EXPECT_NEAR(std::sqrt(axes.eigenvalues()[2]) / ray.norm(), 0.05, 1e-9);
     EXPECT_NEAR(std::sqrt(axes.eigenvalues()[0]) / ray.norm(), 0.7 / (0.9 * 192), 1e-9);
   }
 }
 
 TEST(FindTiePoints, LeavesOutWhatHasNoDepth) {
-  Reconstruction before = epoch(0, Sim3{});
+  Reconstruction before = textured_before();
   std::fill(before.depth.begin(), before.depth.begin() + 4 * 192 * 144, 0.0f);
-  const auto ties = find_tie_points(before, epoch(0.13, kT2FromT1), nearly(), 5);
+  const auto ties = find_tie_points(before, textured_after(), nearly(), 5);
   ASSERT_FALSE(ties.empty());
   for (const TiePoint& tie : ties) EXPECT_EQ(tie.frame_t1, 4);
 }
 
 TEST(FindTiePoints, AreTheSameForAnyNumberOfThreads) {
-  const Reconstruction before = epoch(0, Sim3{}), after = epoch(0.13, kT2FromT1);
   set_num_threads(1);
-  const auto expected = find_tie_points(before, after, nearly(), 5);
+  const auto expected = find_tie_points(textured_before(), textured_after(), nearly(), 5);
   set_num_threads(3);
-  const auto actual = find_tie_points(before, after, nearly(), 5);
+  const auto actual = find_tie_points(textured_before(), textured_after(), nearly(), 5);
   set_num_threads(2);
   ASSERT_EQ(actual.size(), expected.size());
   for (size_t i = 0; i < actual.size(); ++i) {
