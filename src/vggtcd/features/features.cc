@@ -147,7 +147,7 @@ PhotoPair verified(int first, int second, const std::vector<Features>& features,
 
 std::vector<Features> extract_features(const std::vector<Image>& photos, int max_points,
                                        ProgressStage& stage, int max_side_px) {
-  cv::setNumThreads(1);  // we are parallel over photos; OpenCV's threads would race for the order
+  cv::setNumThreads(1);
   std::vector<Features> features(photos.size());
   const auto count = static_cast<int64_t>(photos.size());
   const int64_t slab = 2 * num_threads();

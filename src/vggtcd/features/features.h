@@ -44,7 +44,8 @@ struct PhotoPair {
 Features extract_features(const Image& photo, int max_points,
                           int max_side_px = std::numeric_limits<int>::max());
 
-// The same of each photo, in parallel.
+// The same of each photo, in parallel. Sets OpenCV to one thread for the process: its own would
+// race with ours for the order.
 std::vector<Features> extract_features(const std::vector<Image>& photos, int max_points,
                                        ProgressStage& stage,
                                        int max_side_px = std::numeric_limits<int>::max());

@@ -39,14 +39,15 @@ struct AlignmentOptions {
   bool accept_alignment = false;  // go on where the epochs do not fit together
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
-    field("method", self.method,
-          "auto: robust after a network's joint pass; where the alignment is given, or both epochs "
-          "are parts of one model, the paper's refinement; change by free-space votes in either "
-          "case. robust: all seven parameters "
-          "from the static surfaces and what each photo shows, and change by free-space votes. "
-          "paper: the joint pass, the translation refinement with its residual self-check, and "
-          "change by nearest-neighbour distance, all as in the paper. coarse: the joint pass "
-          "alone, change as in paper.");
+    field(
+        "method", self.method,
+        "auto: robust after a network's joint pass; where the alignment is given, or both epochs "
+        "are parts of one model, the paper's refinement; change by free-space votes in either "
+        "case. robust: all seven parameters from places that photos of both epochs show alike, "
+        "from the static surfaces and from what each photo shows, and change by free-space votes. "
+        "paper: the joint pass, the translation refinement with its residual self-check, and "
+        "change by nearest-neighbour distance, all as in the paper. coarse: the joint pass "
+        "alone, change as in paper.");
     field("shared_intrinsics", self.shared_intrinsics,
           "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
           "match, as "

@@ -30,8 +30,9 @@ PhotoErrors photos_of(const Walk& t1, const Walk& t2, const Vector7& of_t1, doub
   PhotoErrors photos;
   photos.centers = t1.shown;
   photos.centers.insert(photos.centers.end(), t2.shown.begin(), t2.shown.end());
-  photos.groups_t1 = photos.frames_t1 = static_cast<int>(t1.cameras.size());
-  photos.frames_t2 = static_cast<int>(t2.cameras.size());
+  photos.groups = PhotoGroups(
+      {static_cast<int32_t>(t1.cameras.size()), static_cast<int32_t>(t2.cameras.size())});
+  photos.known.assign(photos.centers.size(), true);
   const Eigen::Index size = 7 * static_cast<Eigen::Index>(photos.centers.size());
   photos.mean = Eigen::VectorXd::Zero(size);
   for (size_t k = 0; k < t1.shown.size(); ++k) {
@@ -47,8 +48,8 @@ const Vector7 kCommon = (Vector7() << 1, -2, 3, 4, -5, 6, 7).finished() * 1e-3;
 
 TEST(FitCameras, WhatAllPhotosOfAnEpochErrAlikeIsTheEpochs) {
   const Walk t1(0), t2(0.4);
-  const CameraFit fit =
-      fit_cameras(photos_of(t1, t2, kCommon, 0), t1.cameras, t2.cameras, kPivot, Matrix7::Zero());
+  const CameraFit fit = fit_cameras(photos_of(t1, t2, kCommon, 0), t1.cameras, t2.cameras, kPivot,
+                                    Matrix7::Zero(), {});
   EXPECT_LT((fit.step - kCommon).norm(), 1e-12);
   // The same error of T2's photos is the opposite correction.
   PhotoErrors of_t2 = photos_of(t1, t2, Vector7::Zero(), 0);
@@ -56,7 +57,8 @@ TEST(FitCameras, WhatAllPhotosOfAnEpochErrAlikeIsTheEpochs) {
     of_t2.mean.segment<7>(7 * static_cast<Eigen::Index>(12 + k)) =
         pivot_change(t2.shown[k] - kPivot) * kCommon;
   }
-  const CameraFit opposite = fit_cameras(of_t2, t1.cameras, t2.cameras, kPivot, Matrix7::Zero());
+  const CameraFit opposite =
+      fit_cameras(of_t2, t1.cameras, t2.cameras, kPivot, Matrix7::Zero(), {});
   EXPECT_LT((opposite.step + kCommon).norm(), 1e-12);
 }
 
@@ -67,7 +69,7 @@ TEST(FitCameras, CarriesTheCamerasWhereTheirPhotosPutThem) {
   PhotoErrors photos = photos_of(t1, t2, Vector7::Zero(), 0);
   const Vector7 turn = (Vector7() << 0, 0, 0.01, 0, 0, 0, 0).finished();
   for (Eigen::Index k = 0; k < 12; ++k) photos.mean.segment<7>(7 * k) = turn;
-  const CameraFit fit = fit_cameras(photos, t1.cameras, t2.cameras, kPivot, Matrix7::Zero());
+  const CameraFit fit = fit_cameras(photos, t1.cameras, t2.cameras, kPivot, Matrix7::Zero(), {});
   double before = 0, after = 0;
   for (size_t k = 0; k < 12; ++k) {
     const Eigen::Vector3d belongs = small_similarity(turn, t1.shown[k]) * t1.cameras[k];
@@ -84,9 +86,54 @@ TEST(FitCameras, AStraightWalkLeavesNoRotationOpen) {
     t1.cameras[k] = t2.cameras[k] = {0.2 * static_cast<double>(k), 0, 0};
     t1.shown[k] = t2.shown[k] = t1.cameras[k] + Eigen::Vector3d(0, 4, 0);
   }
-  const CameraFit fit =
-      fit_cameras(photos_of(t1, t2, kCommon, 0), t1.cameras, t2.cameras, kPivot, Matrix7::Zero());
+  const CameraFit fit = fit_cameras(photos_of(t1, t2, kCommon, 0), t1.cameras, t2.cameras, kPivot,
+                                    Matrix7::Zero(), {});
   EXPECT_LT((fit.step - kCommon).norm(), 1e-12);
+}
+
+TEST(FitCameras, WhatAllErrAlikeIsNoBend) {
+  const Walk t1(0), t2(0.4);
+  const CameraFit fit = fit_cameras(photos_of(t1, t2, kCommon, 0), t1.cameras, t2.cameras, kPivot,
+                                    Matrix7::Zero(), {});
+  EXPECT_LT(fit.bend.norm(), 1e-20);
+}
+
+TEST(FitCameras, BendIsTheScatterOfTheCamerasAsTwoSamplesOfEachEpoch) {
+  // Photos of T1 displaced sideways, one up and one down: a scatter of kShift that no fit takes up.
+  constexpr double kShift = 0.1;
+  const Walk t1(0), t2(0.4);
+  PhotoErrors photos = photos_of(t1, t2, Vector7::Zero(), 0);
+  for (Eigen::Index k = 0; k < 12; ++k) photos.mean[7 * k + 5] = k % 2 == 0 ? kShift : -kShift;
+  const CameraFit fit = fit_cameras(photos, t1.cameras, t2.cameras, kPivot, Matrix7::Zero(), {});
+  // How far it lets T1's cameras go, on average: kShift^2 over two samples, for seven parameters
+  // instead of the three of a mean.
+  double predicted = 0;
+  for (const Eigen::Vector3d& camera : t1.cameras) {
+    const Matrix3x7 jacobian = point_jacobian(camera - kPivot);
+    predicted += (jacobian * fit.bend * jacobian.transpose()).trace() / 12;
+  }
+  EXPECT_GT(predicted, 0.5 * kShift * kShift / 2);
+  EXPECT_LT(predicted, 7.0 / 3 * kShift * kShift / 2);
+}
+
+TEST(FitCameras, TwoPhotosBendAsMuchAsAPhotoIsKnownToErr) {
+  Walk t1(0), t2(0.4);
+  for (std::vector<Eigen::Vector3d>* list : {&t1.cameras, &t1.shown, &t2.cameras, &t2.shown}) {
+    list->resize(2);
+  }
+  PhotoErrors photos;
+  photos.centers = t1.shown;
+  photos.centers.insert(photos.centers.end(), t2.shown.begin(), t2.shown.end());
+  photos.groups = PhotoGroups({2, 2});
+  photos.known.assign(4, true);
+  photos.mean = Eigen::VectorXd::Zero(28);
+  photos.response = Eigen::MatrixXd::Zero(28, 7);
+  photos.covariance = Eigen::MatrixXd::Zero(28, 28);
+  const auto bend = [&](double sigma) {
+    return fit_cameras(photos, t1.cameras, t2.cameras, kPivot, Matrix7::Zero(), {0, sigma, 0}).bend;
+  };
+  EXPECT_GT(bend(0.1).ldlt().vectorD().minCoeff(), 0);
+  EXPECT_LT((bend(0.1) - 100 * bend(0.01)).norm(), 1e-12 * bend(0.1).norm());
 }
 
 TEST(FitCameras, CovarianceIsTheSpreadOfWhatComesOut) {
@@ -98,7 +145,7 @@ TEST(FitCameras, CovarianceIsTheSpreadOfWhatComesOut) {
     photos.response.block<7, 7>(7 * k, 0) = kResponse * Matrix7::Identity();
   }
   const Matrix7 surface = kSurfaceSigma * kSurfaceSigma * Matrix7::Identity();
-  const CameraFit expected = fit_cameras(photos, t1.cameras, t2.cameras, kPivot, surface);
+  const CameraFit expected = fit_cameras(photos, t1.cameras, t2.cameras, kPivot, surface, {});
   std::mt19937 engine(3);
   std::normal_distribution<double> normal;
   constexpr int kDraws = 4000;
@@ -109,8 +156,9 @@ TEST(FitCameras, CovarianceIsTheSpreadOfWhatComesOut) {
     drawn.mean += photos.response * theta +
                   kSigma * Eigen::VectorXd::NullaryExpr(
                                drawn.mean.size(), [&](Eigen::Index) { return normal(engine); });
-    const Vector7 error =
-        theta + fit_cameras(drawn, t1.cameras, t2.cameras, kPivot, surface).step - expected.step;
+    const Vector7 error = theta +
+                          fit_cameras(drawn, t1.cameras, t2.cameras, kPivot, surface, {}).step -
+                          expected.step;
     scatter += error * error.transpose() / kDraws;
   }
   // 4000 draws give a variance to 2.2 %; the tolerance is four of these.

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Comparing candidates by one cost on the surfaces of both epochs.
+// Comparing candidates by one cost, on tie points or the surfaces of both epochs.
 #include "vggtcd/registration/candidates.h"
 
 #include <algorithm>
 
+#include "vggtcd/core/error.h"
 #include "vggtcd/scene/oriented_points.h"
 
 namespace vggtcd {
@@ -36,11 +37,8 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
   choice.explanation = choice.robust.explanation;
   choice.candidates = {initial};
   // Too little to compare anything on.
-  if (!(choice.robust.relative_sigma > 0)) return choice;
-  choice.candidates[0].cost =
-      choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs
-          ? candidate_cost(t1, t2, ties, initial.t2_from_t1, choice.robust, options)
-          : choice.robust.cost_initial;
+  if (choice.robust.verdict == RobustVerdict::kKeptInitialFewPairs) return choice;
+  choice.candidates[0].cost = choice.robust.cost_initial;
   if (fine.verdict == FineVerdict::kRefined) {
     choice.candidates.push_back(
         {"fine", fine.t2_from_t1,

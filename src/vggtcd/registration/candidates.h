@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The adaptive choice: of several similarities between two epochs the one that fits the surfaces
-// of both best (method robust).
+// The adaptive choice: of several similarities between two epochs the one that fits
+// what both show best (method robust).
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ namespace vggtcd {
 struct AlignmentCandidate {
   std::string name;
   Sim3 t2_from_t1;
-  double cost = 0;  // surface_cost, at one scale for all candidates
+  double cost = 0;  // candidate_cost, at one scale for all candidates
 };
 
 struct AlignmentChoice {

@@ -70,6 +70,26 @@ TEST(ChooseAlignment, GoesByTiePointsWherePhotosShowPlacesThatCanBeRecognised) {
   EXPECT_NEAR(slid.t2_from_t1.translation.x(), 0.03, 0.01);
 }
 
+TEST(ChooseAlignment, IsNotDrawnByPlacesThatOnlyLookAlike) {
+  // The same relief, papered anew: what photos show alike is chance.
+  const auto papered = [](double camera_offset, uint8_t (*gray)(double, double)) {
+    return testing_support::reconstruct({.frames = 5,
+                                         .width = 192,
+                                         .height = 144,
+                                         .camera_offset = camera_offset,
+                                         .relief = bumps,
+                                         .gray = gray},
+                                        Sim3{});
+  };
+  const auto anew = [](double x, double y) { return testing_support::mottled(x + 31.7, y - 58.3); };
+  const AlignmentChoice choice =
+      choose_alignment(papered(0, testing_support::mottled), papered(0.1, anew),
+                       {{"coarse", shifted(0.03), 0}, {}}, {}, {});
+  EXPECT_EQ(choice.robust.compared_by, CandidateCost::kSurfaces);
+  EXPECT_LT((choice.t2_from_t1 * Eigen::Vector3d(0, 0, 5) - Eigen::Vector3d(0, 0, 5)).norm(),
+            0.005);
+}
+
 TEST(ChooseAlignment, KeepsTheInitialOneWhereThereIsTooLittleSurface) {
   RobustOptions options;
   options.min_pairs = 1 << 30;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well static surfaces hold each degree of freedom, in words.
+// How well what is static holds each degree of freedom, in words.
 #include "vggtcd/registration/constraints.h"
 
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well static surfaces hold each degree of freedom of a similarity, and what they leave open,
+// How well what is static holds each degree of freedom of a similarity, and what they leave open,
 // in words.
 #pragma once
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robust registration: all seven parameters from the static surfaces of both epochs, held near the
-// initial similarity by its own uncertainty.
+// Robust registration: all seven parameters from tie points between photos and from the static
+// surfaces of both epochs, held near the initial similarity by its own uncertainty.
 #include "vggtcd/registration/robust.h"
 
 #include <Eigen/Cholesky>
@@ -10,8 +10,8 @@
 #include <numeric>
 #include <span>
 
+#include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
-#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/robust_extent.h"
 #include "vggtcd/registration/camera_fit.h"
 #include "vggtcd/registration/constraints.h"
@@ -30,6 +30,10 @@ constexpr double kConvergedStep = 0.1;
 // Residuals are never believed to be smaller than this share of the depth: on data without noise
 // the rounding of float positions would otherwise count as information.
 constexpr double kSigmaFloor = 1e-4;
+// Ties that are off by five times what they promise, whatever photos err, are chance; so they are
+// where less than this share of them agrees with the rest: of random ones a twentieth does.
+constexpr double kMaxTieVariance = 25;
+constexpr double kMinTiesAgreeing = 0.3;
 
 struct Rejected {
   int64_t far = 0;
@@ -138,11 +142,23 @@ InitialUncertainty assumed_uncertainty(const RobustOptions& options, double exte
 // What surfaces and ties tell about the similarity: the surfaces' part of it without the noise of
 // their normals.
 Matrix7 held_information(const Matrix7& information, const std::vector<SurfacePair>& pairs,
-                         bool has_ties, const Eigen::Vector3d& pivot, const FrameSpread* spread) {
+                         bool has_ties, PhotoCounts photos, const Eigen::Vector3d& pivot,
+                         const FrameSpread* spread) {
   if (!has_ties) return without_normal_noise(information, pairs, pivot);
   if (pairs.empty()) return information;
-  const Matrix7 of_surfaces = surface_equations(pairs, {}, pivot, spread, kSigmaFloor).information;
+  const Matrix7 of_surfaces =
+      frame_equations(pairs, {}, photos, pivot, spread, kSigmaFloor).information;
   return information - of_surfaces + without_normal_noise(of_surfaces, pairs, pivot);
+}
+
+bool believable(const WeighedTies& weighed, int64_t ties, const RobustOptions& options) {
+  const auto used = static_cast<double>(weighed.used);
+  return weighed.variance <= kMaxTieVariance && weighed.used >= options.min_ties &&
+         used >= kMinTiesAgreeing * static_cast<double>(ties);
+}
+
+int64_t number_across(std::span<const TiePoint> ties) {
+  return std::count_if(ties.begin(), ties.end(), [](const TiePoint& tie) { return tie.across(); });
 }
 
 Eigen::Vector3d mean_of(const std::vector<Eigen::Vector3f>& points) {
@@ -180,36 +196,49 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
 
   const FrameSpread* spread = options.frame_errors ? &result.uncertainty.frame : nullptr;
   const SurfaceMatcher matcher(t1, t2, options.relative_depth ? 0 : result.extent_u);
-  if (static_cast<int64_t>(ties.size()) < options.min_ties) ties = {};
-  result.ties = static_cast<int64_t>(ties.size());
+  result.ties = number_across(ties);
+  if (result.ties < options.min_ties) ties = {};
+  const PhotoCounts photos{static_cast<int32_t>(t1.cameras.size()),
+                           static_cast<int32_t>(t2.cameras.size())};
   std::vector<SurfacePair> pairs;
   WeighedTies weighed;
-  std::optional<PhotoErrors> photos;
+  FrameEquations equations;
   Sim3 current = initial_t2_from_t1;
   Vector7 step = Vector7::Zero();
-  SurfaceEquations equations;
   const int64_t times = (result.points_t1 + result.points_t2) / kSearchingPoints;
   const int stride = static_cast<int>(std::clamp<int64_t>(times, 1, 1000));
+  const auto search = [&] {
+    matcher.pairs(current, options.both_directions, stride, pairs);
+    const Rejected rejected = keep_static(pairs, options);
+    result.pairs = static_cast<int64_t>(pairs.size());
+    result.rejected_far = rejected.far;
+    result.rejected_normal = rejected.normal;
+    if (result.pairs < options.min_pairs) pairs.clear();
+  };
+  const auto weigh = [&] {
+    weighed = weigh_ties(ties, current, equations.photos ? &*equations.photos : nullptr, step);
+  };
   bool searching = ties.empty();  // ties need no search: until they have converged they go alone
   while (!result.converged && result.iterations < options.max_iterations) {
     ++result.iterations;
-    if (searching) {
-      matcher.pairs(current, options.both_directions, stride, pairs);
-      const Rejected rejected = keep_static(pairs, options);
-      result.pairs = static_cast<int64_t>(pairs.size());
-      result.rejected_far = rejected.far;
-      result.rejected_normal = rejected.normal;
-      if (result.pairs < options.min_pairs && ties.empty()) {
-        result.explanation = fmt::format(
-            "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
-            "refinement needs.",
-            result.pairs, options.min_pairs);
-        return result;
-      }
+    searching = searching || 2 * result.iterations >= options.max_iterations;
+    if (searching) search();
+    weigh();
+    if (searching && !ties.empty() && !believable(weighed, result.ties, options)) {
+      ties = {};  // start again without them
+      weigh();
+      current = initial_t2_from_t1;
+      search();
     }
-    weighed = weigh_ties(ties, current, photos ? &*photos : nullptr, step);
-    equations = surface_equations(pairs, weighed.points, result.pivot_in_t2, spread, kSigmaFloor);
-    photos = equations.photos;
+    if (ties.empty() && pairs.empty()) {
+      result.explanation = fmt::format(
+          "Kept the initial alignment: {} static surface pairs are fewer than the {} that a "
+          "refinement needs.",
+          result.pairs, options.min_pairs);
+      return result;
+    }
+    equations =
+        frame_equations(pairs, weighed.points, photos, result.pivot_in_t2, spread, kSigmaFloor);
 
     // The prior's residual is what separates the current from the initial similarity.
     const Vector7 from_initial =
@@ -220,16 +249,18 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     current = small_similarity(step, result.pivot_in_t2) * current;
     const bool small = step.dot(information * step) < kConvergedStep * kConvergedStep;
     result.converged = small && searching;
-    searching = searching || small || result.iterations >= options.max_iterations / 2;
+    searching = searching || small;
   }
   result.relative_sigma = equations.relative_sigma;
   result.ties_used = weighed.used;
+  result.tie_deviation = std::sqrt(weighed.variance);
   result.residual_sigma_u = result.relative_sigma * median_over(pairs, [](const SurfacePair& pair) {
                               return pair.depth_u;
                             });
-  const Constraints constraints = constraints_of(
-      held_information(equations.information, pairs, !ties.empty(), result.pivot_in_t2, spread),
-      prior_covariance, result.pivot_in_t2);
+  const Constraints constraints =
+      constraints_of(held_information(equations.information, pairs, !ties.empty(), photos,
+                                      result.pivot_in_t2, spread),
+                     prior_covariance, result.pivot_in_t2);
   result.covariance = constraints.covariance;
   result.constrained_share = constraints.constrained_share;
   result.open_degrees_of_freedom = constraints.open_degrees_of_freedom;
@@ -253,24 +284,26 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   }
   result.verdict = RobustVerdict::kRefined;
   result.t2_from_t1 = current;
-  if (options.camera_fit && options.frame_errors) {
-    matcher.pairs(current, options.both_directions, stride, pairs);
-    keep_static(pairs, options);
-    weighed = weigh_ties(ties, current, &*photos, step);
+  if (spread) {
+    search();
+    weigh();
     const PhotoErrors errors =
-        photo_errors(pairs, weighed.points, result.pivot_in_t2, *spread, kSigmaFloor);
+        photo_errors(pairs, weighed.points, photos, result.pivot_in_t2, *spread, kSigmaFloor);
     std::vector<Eigen::Vector3d> cameras_t1 = t1.cameras;
     for (Eigen::Vector3d& camera : cameras_t1) camera = current * camera;
     const CameraFit fit =
-        fit_cameras(errors, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance);
-    result.t2_from_t1 = small_similarity(fit.step, result.pivot_in_t2) * current;
-    result.covariance = fit.covariance + fit.bend;
+        fit_cameras(errors, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance, *spread);
+    if (options.camera_fit) {
+      result.t2_from_t1 = small_similarity(fit.step, result.pivot_in_t2) * current;
+      result.covariance = fit.covariance;
+    }
+    result.covariance += fit.bend;
   }
+  const std::string ties_used =
+      ties.empty() ? "" : fmt::format("{} tie points between photos and ", result.ties_used);
   result.explanation = fmt::format(
-      "Refined rotation, translation and scale on {} static surface pairs, which fit to {:.3g}, "
-      "{}.",
-      result.pairs, result.residual_sigma_u,
-      ties.empty() ? "without tie points" : fmt::format("and {} tie points", result.ties_used));
+      "Refined rotation, translation and scale on {}{} static surface pairs, which fit to {:.3g}.",
+      ties_used, pairs.size(), result.residual_sigma_u);
   if (!result.open_motions.empty()) {
     result.explanation += fmt::format(
         " Held by the initial alignment only, not by what is static: {} (in the T2 frame).",

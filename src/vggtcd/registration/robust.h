@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Robust registration: all seven parameters from the static surfaces of both epochs, held near the
-// initial similarity by its own uncertainty.
+// Robust registration: all seven parameters from tie points between photos and from the static
+// surfaces of both epochs, held near the initial similarity by its own uncertainty.
 #pragma once
 
 #include <Eigen/Core>
@@ -35,7 +35,7 @@ struct RobustOptions {
   double frame_sigma = 0.002;  // of one photo; > 0
   int max_iterations = 30;     // >= 1
   int64_t min_ties = 50;       // fewer tie points are not looked at; >= 7
-  int64_t min_pairs = 200;     // fewer gated pairs keep the initial similarity; >= 7
+  int64_t min_pairs = 200;     // fewer gated pairs are not looked at; >= 7
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("robust_grid_resolution", self.robust_grid_resolution,
@@ -62,10 +62,11 @@ struct RobustOptions {
           "surfaces.");
     field("tie_photos", self.tie_photos,
           "Robust: photos of each epoch that are searched for such places.");
-    field("min_ties", self.min_ties, "Robust: fewer of them are taken for chance.");
+    field("min_ties", self.min_ties,
+          "Robust: fewer of them between the epochs are taken for chance.");
     field("camera_fit", self.camera_fit,
           "Robust: the similarity that carries the cameras, by what their photos show, is the "
-          "result; else the one that fits the surfaces. Needs frame-errors.");
+          "result; else the one that fits what they show. Needs frame-errors.");
     field(
         "prior_sigma", self.prior_sigma,
         "Robust: assumed standard deviation of the initial alignment's rotation (rad), log scale, "
@@ -73,14 +74,15 @@ struct RobustOptions {
     field("frame_sigma", self.frame_sigma, "Robust: the same of one photo's points.");
     field("max_iterations", self.max_iterations, "Robust: Gauss-Newton iterations at most.");
     field("min_pairs", self.min_pairs,
-          "Robust: with fewer static pairs the initial alignment is kept.");
+          "Robust: fewer static pairs are not looked at; without ties the initial alignment is "
+          "kept then.");
   };
   void validate() const;
 };
 
 enum class RobustVerdict {
   kRefined,
-  kKeptInitialFewPairs,   // not enough static surface
+  kKeptInitialFewPairs,   // not enough static surface, and no ties
   kKeptInitialNotBetter,  // the robust cost did not fall
 };
 std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict);
@@ -89,20 +91,20 @@ enum class CandidateCost { kSurfaces, kTiePoints };
 std::span<const EnumName<CandidateCost>> enum_names(CandidateCost);
 
 struct RobustResult {
-  Sim3 t2_from_t1;  // carries the cameras, if asked for (camera_fit); else fits the surfaces
+  Sim3 t2_from_t1;  // carries the cameras, if asked for (camera_fit); else what they show
   RobustVerdict verdict = RobustVerdict::kKeptInitialFewPairs;
   std::string explanation;
 
   Eigen::Vector3d pivot_in_t2 = Eigen::Vector3d::Zero();
   double extent_u = 0;  // robust extent of T2's points
-  // Of the seven parameters of t2_from_t1 about the pivot, from the surfaces, the photos' own
-  // errors and the initial uncertainty.
+  // Of the seven parameters of t2_from_t1 about the pivot, from surfaces, ties, the photos' own
+  // errors, the initial uncertainty, and (with frame_errors) the bend of both passes.
   Matrix7 covariance = Matrix7::Zero();
-  // Per degree of freedom, 0 to 1: the share of what is known about it that comes from the static
-  // surfaces (the rest is the initial similarity): one minus the ratio of variances. A plane leaves
-  // two translations, a rotation and the scale near 0.
+  // Per degree of freedom, 0 to 1: the share of what is known about it that comes from surfaces and
+  // ties (the rest is the initial similarity): one minus the ratio of variances. A plane without
+  // ties leaves two translations, a rotation and the scale near 0.
   Vector7 constrained_share = Vector7::Zero();
-  // What the surfaces leave to the initial similarity, in words (constraints.h).
+  // What they leave to the initial similarity, in words (constraints.h).
   int open_degrees_of_freedom = 0;
   std::vector<std::string> open_motions;
 
@@ -113,20 +115,23 @@ struct RobustResult {
   // Robust standard deviation of the point-to-plane residuals at the median depth, and per depth of
   // the pair, which is what they are weighed by.
   double residual_sigma_u = 0, relative_sigma = 0;
-  int64_t ties = 0, ties_used = 0;  // tie points, and those that are not outliers
-  InitialUncertainty uncertainty;   // what was assumed or measured beforehand
+  int64_t ties = 0;                // between the epochs, found
+  int64_t ties_used = 0;           // of them, not outliers; 0 if ties were not believed
+  double tie_deviation = 0;        // of their distances against what they promise
+  InitialUncertainty uncertainty;  // what was assumed or measured beforehand
   bool uncertainty_measured = false;
   CandidateCost compared_by = CandidateCost::kSurfaces;
-  double tie_variance = 0;  // of the ties' distances without what photos' own errors explain
+  double tie_variance = 0;  // as tie_deviation^2, with the photos' own errors: scales tie_cost
   bool converged = false;   // the last step was below a tenth of a standard deviation
   double cost_initial = 0, cost_final = 0;  // candidate_cost of the start and the surfaces' fit
 };
 
-// Gauss-Newton on r = n . (T x - y), whose deviation grows with depth, over the nearest pairs,
-// Tukey weights, gates on distance and normals, photos that may err as a whole (frame_equations.h),
-// and the initial similarity with its uncertainty as prior: the maximum a posteriori. `measured` is
-// what the coarse stage knows about itself (coarse_uncertainty); without it prior_sigma and
-// frame_sigma stand in.
+// Gauss-Newton over the ties and, once they have converged, the nearest pairs of surfaces, in one
+// model in which photos may err as a whole (frame_equations.h): ties with Tukey weights on their
+// Mahalanobis distance (tie_weights.h), surfaces with r = n . (T x - y), whose deviation grows with
+// depth, Tukey weights and gates on distance and normals, and the initial similarity with its
+// uncertainty as prior: the maximum a posteriori. `measured` is what the coarse stage knows about
+// itself (coarse_uncertainty); without it prior_sigma and frame_sigma stand in.
 RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           std::span<const TiePoint> ties, const Sim3& initial_t2_from_t1,
                           const std::optional<InitialUncertainty>& measured,

@@ -142,11 +142,12 @@ std::vector<TiePoint> ties_on_the_plane(int count, double shift) {
   std::vector<TiePoint> ties;
   for (int i = 0; i < count; ++i) {
     TiePoint& tie = ties.emplace_back();
-    tie.frame_t1 = i % 5;
-    tie.frame_t2 = (i / 5) % 5;
-    tie.in_t1 = {place(random), place(random), 5};
-    tie.in_t2 = tie.in_t1 + Eigen::Vector3d(shift + noise(random), noise(random), noise(random));
-    tie.covariance_t1 = tie.covariance_t2 = 0.5 * kSigma * kSigma * Eigen::Matrix3d::Identity();
+    tie.first_photo = {true, i % 5};
+    tie.second_photo = {false, (i / 5) % 5};
+    tie.first = {place(random), place(random), 5};
+    tie.second = tie.first + Eigen::Vector3d(shift + noise(random), noise(random), noise(random));
+    tie.first_covariance = tie.second_covariance =
+        0.5 * kSigma * kSigma * Eigen::Matrix3d::Identity();
   }
   return ties;
 }
@@ -176,9 +177,51 @@ TEST(AlignRobust, TooFewTiesAreChance) {
   const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
   const RobustResult without = align_robust(t1, t2, {}, kError, {}, {});
   const RobustResult result = align_robust(t1, t2, ties_on_the_plane(49, 0.3), kError, {}, {});
-  EXPECT_EQ(result.ties, 0);
+  EXPECT_EQ(result.ties, 49);
+  EXPECT_EQ(result.ties_used, 0);
   EXPECT_EQ(result.compared_by, CandidateCost::kSurfaces);
   EXPECT_EQ(result.t2_from_t1.translation, without.t2_from_t1.translation);
+}
+
+TEST(AlignRobust, TiesThatContradictEachOtherAreDropped) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> anywhere(-0.4, 0.4);
+  std::vector<TiePoint> ties = ties_on_the_plane(400, 0);
+  for (TiePoint& tie : ties) {
+    tie.second += Eigen::Vector3d(anywhere(random), anywhere(random), anywhere(random));
+  }
+  const RobustResult without = align_robust(t1, t2, {}, kError, {}, {});
+  const RobustResult result = align_robust(t1, t2, ties, kError, {}, {});
+  EXPECT_EQ(result.ties, 400);
+  EXPECT_EQ(result.ties_used, 0);
+  EXPECT_EQ(result.compared_by, CandidateCost::kSurfaces);
+  EXPECT_LT(difference(result.t2_from_t1, without.t2_from_t1).norm(),
+            0.02 * difference(kError, {}).norm());
+}
+
+TEST(AlignRobust, TiesAloneDoWhereSurfacesAreTooFew) {
+  RobustOptions options;
+  options.static_distance = 1e-4;  // hardly a pair is that near
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  const RobustResult result = align_robust(t1, t2, ties_on_the_plane(400, 0), kError, {}, options);
+  EXPECT_EQ(result.verdict, RobustVerdict::kRefined);
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.15 * difference(kError, {}).norm());
+  EXPECT_THAT(result.explanation, testing::HasSubstr("tie points between photos and 0 static"));
+}
+
+TEST(AlignRobust, TakesTiesWithoutPhotosErrorsAndInOneIteration) {
+  const OrientedPoints t1 = points_of(bumps, 0), t2 = points_of(bumps, 0.13);
+  RobustOptions options;
+  options.frame_errors = false;
+  const RobustResult independent =
+      align_robust(t1, t2, ties_on_the_plane(400, 0), kError, {}, options);
+  EXPECT_LT(difference(independent.t2_from_t1, {}).norm(), 0.1 * difference(kError, {}).norm());
+  options = {};
+  options.max_iterations = 1;
+  const RobustResult once = align_robust(t1, t2, ties_on_the_plane(400, 0), kError, {}, options);
+  EXPECT_EQ(once.iterations, 1);
+  EXPECT_GT(once.pairs, 0);
 }
 
 TEST(AlignRobust, ConstrainsEverythingOnARelief) {

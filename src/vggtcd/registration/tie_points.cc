@@ -13,21 +13,23 @@
 #include "vggtcd/core/progress.h"
 #include "vggtcd/features/features.h"
 #include "vggtcd/scene/confidence.h"
+#include "vggtcd/scene/image.h"
 #include "vggtcd/scene/keyframes.h"
 #include "vggtcd/scene/view_overlap.h"
 
 namespace vggtcd {
 namespace {
 
-constexpr int kMaxKeyPoints = 500;      // of a photo
-constexpr int kMaxSide_px = 320;        // photos are shrunk to it: photos err more than key points
-constexpr int kPairsPerPhoto = 4;       // chosen by each photo; a pair may be chosen by both
+constexpr int kMaxKeyPoints = 500;  // of a photo
+constexpr int kMaxSide_px = 320;    // photos are shrunk to it: they err more than key points do
+// Chosen by each photo, of the other epoch and of its own; a pair may be chosen by both.
+constexpr int kPairsPerPhoto = 4, kPairsWithinEpoch = 2;
+constexpr size_t kMinTiesOfPair = 6;    // of two photos
 constexpr double kSearchShare = 0.08;   // of the photo's width: how far off a key point may be
 constexpr double kMinConfidence = 15;   // percentile
 constexpr float kMaxDepthStep = 0.06f;  // within 3 x 3 pixels, of the depth: another surface
 constexpr double kKeyPointSigma_px = 0.7;
-constexpr double kDepthSigma =
-    0.05;  // far along a ray, of the depth: ties go by what is seen, not by it
+constexpr double kDepthSigma = 0.05;  // of the depth; ties go by what is seen, not by it
 
 // A key point in space: its pixel, depth and place in the epoch's frame.
 struct Lifted {
@@ -110,62 +112,87 @@ std::vector<Eigen::Vector2f> expected(const Photo& photo, const Sim3& other_from
   return pixels;
 }
 
-// Of each chosen photo the chosen photos of the other epoch that overlap it most, from both sides.
-std::vector<std::pair<size_t, size_t>> overlapping_pairs(const Reconstruction& before,
-                                                         const Reconstruction& after,
-                                                         const Sim3& t2_from_t1,
-                                                         const std::vector<int>& frames_t1,
-                                                         const std::vector<int>& frames_t2) {
-  std::set<std::pair<size_t, size_t>> pairs;
-  const auto add = [&](const Reconstruction& from, const Reconstruction& to, const Sim3& to_from,
-                       const std::vector<int>& frames, const std::vector<int>& others,
-                       bool swapped) {
-    const auto best = overlapping_views(from, to, to_from, to.num_frames());
-    for (size_t i = 0; i < frames.size(); ++i) {
-      int taken = 0;
-      for (const int other : best[static_cast<size_t>(frames[i])]) {
-        const auto found = std::lower_bound(others.begin(), others.end(), other);
-        if (found == others.end() || *found != other) continue;
-        const auto j = static_cast<size_t>(found - others.begin());
-        pairs.insert(swapped ? std::pair(j, i) : std::pair(i, j));
-        if (++taken == kPairsPerPhoto) break;
-      }
+// One epoch's chosen photos.
+struct EpochPhotos {
+  const Reconstruction& reconstruction;
+  bool is_t1;
+  std::vector<int> frames;
+  std::vector<Photo> photos;
+};
+
+EpochPhotos choose_photos(const Reconstruction& r, bool is_t1, int photos_per_epoch) {
+  const std::vector<int> frames = select_keyframes(r.num_frames(), photos_per_epoch);
+  return {r, is_t1, frames, photos_of(r, frames)};
+}
+
+using Pairs = std::set<std::pair<size_t, size_t>>;  // of positions in EpochPhotos
+
+// Of each photo of `from` the photos of `to` that overlap it most, without itself.
+void add_overlapping(const EpochPhotos& from, const EpochPhotos& to, const Sim3& to_from_from,
+                     int per_photo, Pairs& pairs) {
+  const auto best = overlapping_views(from.reconstruction, to.reconstruction, to_from_from,
+                                      to.reconstruction.num_frames());
+  for (size_t i = 0; i < from.frames.size(); ++i) {
+    int taken = 0;
+    for (const int other : best[static_cast<size_t>(from.frames[i])]) {
+      const auto found = std::lower_bound(to.frames.begin(), to.frames.end(), other);
+      if (found == to.frames.end() || *found != other) continue;
+      const auto j = static_cast<size_t>(found - to.frames.begin());
+      if (from.is_t1 == to.is_t1 && i == j) continue;
+      const bool in_order = from.is_t1 == to.is_t1 ? i < j : from.is_t1;
+      pairs.insert(in_order ? std::pair(i, j) : std::pair(j, i));
+      if (++taken == per_photo) break;
     }
+  }
+}
+
+void append_ties(const EpochPhotos& first, const EpochPhotos& second, const Sim3& second_from_first,
+                 const Pairs& chosen, std::vector<TiePoint>& ties) {
+  const std::vector<std::pair<size_t, size_t>> pairs(chosen.begin(), chosen.end());
+  const int width = std::max(first.reconstruction.width, second.reconstruction.width);
+  const auto radius_px = static_cast<float>(kSearchShare * width);
+  const Sim3 first_from_second = second_from_first.inverse();
+  const auto view_of = [](const EpochPhotos& epoch, const Photo& photo) -> const View& {
+    return epoch.reconstruction.views[static_cast<size_t>(photo.frame)];
   };
-  add(before, after, t2_from_t1, frames_t1, frames_t2, false);
-  add(after, before, t2_from_t1.inverse(), frames_t2, frames_t1, true);
-  return {pairs.begin(), pairs.end()};
+  std::vector<std::vector<TiePoint>> found(pairs.size());
+  parallel_for(static_cast<int64_t>(pairs.size()), 1, [&](int64_t begin, int64_t) {
+    const auto [i, j] = pairs[static_cast<size_t>(begin)];
+    const Photo &a = first.photos[i], &b = second.photos[j];
+    std::vector<TiePoint>& of_pair = found[static_cast<size_t>(begin)];
+    for (const Match& match : match_descriptors_near(
+             a.features, b.features, expected(a, second_from_first, view_of(second, b)),
+             expected(b, first_from_second, view_of(first, a)), radius_px)) {
+      const auto& in_a = a.lifted[static_cast<size_t>(match.first)];
+      const auto& in_b = b.lifted[static_cast<size_t>(match.second)];
+      if (!in_a || !in_b) continue;
+      of_pair.push_back({{first.is_t1, a.frame},
+                         {second.is_t1, b.frame},
+                         in_a->x,
+                         in_b->x,
+                         in_a->covariance,
+                         in_b->covariance});
+    }
+    if (of_pair.size() < kMinTiesOfPair) of_pair.clear();
+  });
+  for (const auto& of_pair : found) ties.insert(ties.end(), of_pair.begin(), of_pair.end());
 }
 
 }  // namespace
 
 std::vector<TiePoint> find_tie_points(const Reconstruction& before, const Reconstruction& after,
                                       const Sim3& t2_from_t1, int photos_per_epoch) {
-  const std::vector<int> frames_t1 = select_keyframes(before.num_frames(), photos_per_epoch);
-  const std::vector<int> frames_t2 = select_keyframes(after.num_frames(), photos_per_epoch);
-  const std::vector<Photo> of_t1 = photos_of(before, frames_t1);
-  const std::vector<Photo> of_t2 = photos_of(after, frames_t2);
-  const auto pairs = overlapping_pairs(before, after, t2_from_t1, frames_t1, frames_t2);
-  const auto radius_px = static_cast<float>(kSearchShare * before.width);
-  const Sim3 t1_from_t2 = t2_from_t1.inverse();
-  std::vector<std::vector<TiePoint>> found(pairs.size());
-  parallel_for(static_cast<int64_t>(pairs.size()), 1, [&](int64_t begin, int64_t) {
-    const auto [i, j] = pairs[static_cast<size_t>(begin)];
-    const Photo &first = of_t1[i], &second = of_t2[j];
-    const auto matches = match_descriptors_near(
-        first.features, second.features,
-        expected(first, t2_from_t1, after.views[static_cast<size_t>(second.frame)]),
-        expected(second, t1_from_t2, before.views[static_cast<size_t>(first.frame)]), radius_px);
-    for (const Match& match : matches) {
-      const auto& a = first.lifted[static_cast<size_t>(match.first)];
-      const auto& b = second.lifted[static_cast<size_t>(match.second)];
-      if (!a || !b) continue;
-      found[static_cast<size_t>(begin)].push_back(
-          {first.frame, second.frame, a->x, b->x, a->covariance, b->covariance});
-    }
-  });
+  const EpochPhotos t1 = choose_photos(before, true, photos_per_epoch);
+  const EpochPhotos t2 = choose_photos(after, false, photos_per_epoch);
+  Pairs across, within_t1, within_t2;
+  add_overlapping(t1, t2, t2_from_t1, kPairsPerPhoto, across);
+  add_overlapping(t2, t1, t2_from_t1.inverse(), kPairsPerPhoto, across);
+  add_overlapping(t1, t1, {}, kPairsWithinEpoch, within_t1);
+  add_overlapping(t2, t2, {}, kPairsWithinEpoch, within_t2);
   std::vector<TiePoint> ties;
-  for (const auto& of_pair : found) ties.insert(ties.end(), of_pair.begin(), of_pair.end());
+  append_ties(t1, t2, t2_from_t1, across, ties);
+  append_ties(t1, t1, {}, within_t1, ties);
+  append_ties(t2, t2, {}, within_t2, ties);
   return ties;
 }
 

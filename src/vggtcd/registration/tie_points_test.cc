@@ -6,6 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "tests/support/toy_scene.h"
 #include "vggtcd/core/parallel.h"
@@ -15,7 +17,6 @@ namespace vggtcd {
 namespace {
 
 using testing_support::kT2FromT1;
-using testing_support::ToyScene;
 
 double bumps(double x, double y) { return 0.3 + 0.25 * std::sin(2 * x) * std::cos(3 * y); }
 
@@ -45,20 +46,47 @@ Sim3 nearly() {
   return kT2FromT1 * small_similarity(error, {0.5, 0, 5});
 }
 
+Eigen::Vector3d in_t2(PhotoNumber photo, const Eigen::Vector3d& x) {
+  return photo.of_t1 ? kT2FromT1 * x : x;
+}
+
 size_t number_of_true(const std::vector<TiePoint>& ties) {
   return static_cast<size_t>(std::count_if(ties.begin(), ties.end(), [](const TiePoint& tie) {
     constexpr double kTwoPixels = 2 * 5 / (0.9 * 192);  // in the scene, at its depth
-    return (kT2FromT1 * tie.in_t1 - tie.in_t2).norm() < kT2FromT1.scale * kTwoPixels;
+    return (in_t2(tie.first_photo, tie.first) - in_t2(tie.second_photo, tie.second)).norm() <
+           kT2FromT1.scale * kTwoPixels;
   }));
 }
 
 TEST(FindTiePoints, FindsPlacesThatBothEpochsShow) {
   const auto ties = find_tie_points(textured_before(), textured_after(), nearly(), 5);
-  EXPECT_GT(ties.size(), 200u);
+  EXPECT_GT(ties.size(), 400u);
   EXPECT_GT(number_of_true(ties), ties.size() * 9 / 10);
+  std::set<std::pair<bool, bool>> epochs;
   for (const TiePoint& tie : ties) {
-    EXPECT_TRUE(tie.frame_t1 >= 0 && tie.frame_t1 < 5 && tie.frame_t2 >= 0 && tie.frame_t2 < 5);
+    epochs.insert({tie.first_photo.of_t1, tie.second_photo.of_t1});
+    for (const PhotoNumber photo : {tie.first_photo, tie.second_photo}) {
+      EXPECT_TRUE(photo.frame >= 0 && photo.frame < 5);
+    }
+    EXPECT_TRUE(tie.across() || tie.first_photo.frame < tie.second_photo.frame);
   }
+  // Between the epochs, T1's photo first, and within either.
+  EXPECT_EQ(epochs, (std::set<std::pair<bool, bool>>{{true, false}, {true, true}, {false, false}}));
+}
+
+size_t number_across(const std::vector<TiePoint>& ties) {
+  return static_cast<size_t>(
+      std::count_if(ties.begin(), ties.end(), [](const TiePoint& tie) { return tie.across(); }));
+}
+
+TEST(FindTiePoints, FindsFewBetweenPlacesThatHaveNothingInCommon) {
+  const auto elsewhere = [](double x, double y) {
+    return testing_support::mottled(x + 31.7, y - 58.3);
+  };
+  const auto ties =
+      find_tie_points(textured_before(), epoch(0.13, kT2FromT1, elsewhere), nearly(), 5);
+  const auto true_ties = find_tie_points(textured_before(), textured_after(), nearly(), 5);
+  EXPECT_LT(number_across(ties), number_across(true_ties) / 4);
 }
 
 TEST(FindTiePoints, FindsThemInAnotherLight) {
@@ -80,22 +108,28 @@ TEST(FindTiePoints, LooksAtNoMorePhotosThanAskedFor) {
   const auto ties = find_tie_points(textured_before(), textured_after(), nearly(), 2);
   ASSERT_FALSE(ties.empty());
   for (const TiePoint& tie : ties) {  // the first and the last
-    EXPECT_EQ(tie.frame_t1 % 4, 0);
-    EXPECT_EQ(tie.frame_t2 % 4, 0);
+    EXPECT_EQ(tie.first_photo.frame % 4, 0);
+    EXPECT_EQ(tie.second_photo.frame % 4, 0);
   }
 }
 
 TEST(FindTiePoints, PixelsAreSurerThanDepths) {
-  const Reconstruction& before = textured_before();
-  for (const TiePoint& tie : find_tie_points(before, textured_after(), nearly(), 5)) {
+  const auto ties = find_tie_points(textured_before(), textured_after(), nearly(), 5);
+  ASSERT_FALSE(ties.empty());
+  const auto check_point = [](PhotoNumber photo, const Eigen::Vector3d& x,
+                              const Eigen::Matrix3d& covariance) {
+    const Reconstruction& epoch = photo.of_t1 ? textured_before() : textured_after();
     const Eigen::Vector3d ray =
-        tie.in_t1 -
-        camera_center(before.views[static_cast<size_t>(tie.frame_t1)].camera_from_world);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(tie.covariance_t1);
+        x - camera_center(epoch.views[static_cast<size_t>(photo.frame)].camera_from_world);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(covariance);
     EXPECT_GT(std::abs(axes.eigenvectors().col(2).dot(ray.normalized())), 1 - 1e-9);
     // 5 % of the distance along the ray; 0.7 px across it.
     EXPECT_NEAR(std::sqrt(axes.eigenvalues()[2]) / ray.norm(), 0.05, 1e-9);
     EXPECT_NEAR(std::sqrt(axes.eigenvalues()[0]) / ray.norm(), 0.7 / (0.9 * 192), 1e-9);
+  };
+  for (const TiePoint& tie : ties) {
+    check_point(tie.first_photo, tie.first, tie.first_covariance);
+    check_point(tie.second_photo, tie.second, tie.second_covariance);
   }
 }
 
@@ -104,7 +138,9 @@ TEST(FindTiePoints, LeavesOutWhatHasNoDepth) {
   std::fill(before.depth.begin(), before.depth.begin() + 4 * 192 * 144, 0.0f);
   const auto ties = find_tie_points(before, textured_after(), nearly(), 5);
   ASSERT_FALSE(ties.empty());
-  for (const TiePoint& tie : ties) EXPECT_EQ(tie.frame_t1, 4);
+  for (const TiePoint& tie : ties) {
+    EXPECT_TRUE(!tie.first_photo.of_t1 || tie.first_photo.frame == 4);
+  }
 }
 
 TEST(FindTiePoints, AreTheSameForAnyNumberOfThreads) {
@@ -115,9 +151,9 @@ TEST(FindTiePoints, AreTheSameForAnyNumberOfThreads) {
   set_num_threads(2);
   ASSERT_EQ(actual.size(), expected.size());
   for (size_t i = 0; i < actual.size(); ++i) {
-    EXPECT_EQ(actual[i].in_t1, expected[i].in_t1);
-    EXPECT_EQ(actual[i].in_t2, expected[i].in_t2);
-    EXPECT_EQ(actual[i].covariance_t2, expected[i].covariance_t2);
+    EXPECT_EQ(actual[i].first, expected[i].first);
+    EXPECT_EQ(actual[i].second, expected[i].second);
+    EXPECT_EQ(actual[i].second_covariance, expected[i].second_covariance);
   }
 }
 

@@ -20,16 +20,24 @@ constexpr double kTukeyWidening = 1.225;
 
 PointPair under(const TiePoint& tie, const Sim3& t2_from_t1) {
   const Eigen::Matrix3d axes = t2_from_t1.scale * t2_from_t1.rotation;
-  return {t2_from_t1 * tie.in_t1, tie.in_t2,
-          (axes * tie.covariance_t1 * axes.transpose() + tie.covariance_t2).inverse(), tie.frame_t1,
-          tie.frame_t2};
+  const auto mapped = [&](PhotoNumber photo, const Eigen::Vector3d& x) {
+    return photo.of_t1 ? t2_from_t1 * x : x;
+  };
+  const auto turned = [&](PhotoNumber photo, const Eigen::Matrix3d& covariance) {
+    return photo.of_t1 ? Eigen::Matrix3d(axes * covariance * axes.transpose()) : covariance;
+  };
+  return {tie.first_photo, tie.second_photo, mapped(tie.first_photo, tie.first),
+          mapped(tie.second_photo, tie.second),
+          (turned(tie.first_photo, tie.first_covariance) +
+           turned(tie.second_photo, tie.second_covariance))
+              .inverse()};
 }
 
 double squared_distance(const PointPair& point, const Eigen::Vector3d& difference) {
   return difference.dot(point.information * difference);
 }
 
-double width(double variance) { return kTukeyWidening * std::sqrt(variance); }
+double tukey_sigma(double variance) { return kTukeyWidening * std::sqrt(variance); }
 
 }  // namespace
 
@@ -40,28 +48,32 @@ WeighedTies weigh_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1,
   std::vector<double> distances;  // squared
   for (const TiePoint& tie : ties) {
     const PointPair& point = result.points.emplace_back(under(tie, t2_from_t1));
-    Eigen::Vector3d difference = point.moving - point.fixed;
+    Eigen::Vector3d difference = point.first - point.second;
     if (photos) difference += photos->displacement(point, theta);
     distances.push_back(squared_distance(point, difference));
   }
   result.variance = std::max(middle_of(distances) / kMedianOfChiSquared3, kLeastVariance);
   for (size_t i = 0; i < ties.size(); ++i) {
-    const double weight = tukey_weight(std::sqrt(distances[i]), width(result.variance));
+    const double weight = tukey_weight(std::sqrt(distances[i]), tukey_sigma(result.variance));
     result.points[i].information *= weight / result.variance;
-    result.used += weight > 0 ? 1 : 0;
+    result.used += weight > 0 && ties[i].across() ? 1 : 0;
   }
   return result;
 }
 
 double tie_cost(std::span<const TiePoint> ties, const Sim3& t2_from_t1, double variance) {
-  check(!ties.empty() && variance > 0, "tie_cost: ties and a positive variance");
+  check(variance > 0, "tie_cost: a positive variance");
   double sum = 0;
+  int64_t across = 0;
   for (const TiePoint& tie : ties) {
+    if (!tie.across()) continue;
     const PointPair point = under(tie, t2_from_t1);
-    sum +=
-        tukey_loss(std::sqrt(squared_distance(point, point.moving - point.fixed)), width(variance));
+    sum += tukey_loss(std::sqrt(squared_distance(point, point.first - point.second)),
+                      tukey_sigma(variance));
+    ++across;
   }
-  return sum / static_cast<double>(ties.size());
+  check(across > 0, "tie_cost: ties between the epochs");
+  return sum / static_cast<double>(across);
 }
 
 }  // namespace vggtcd

@@ -16,17 +16,19 @@ namespace vggtcd {
 struct WeighedTies {
   std::vector<PointPair> points;  // in T2; Tukey's weight and the variance are in the information
   double variance = 0;  // of the squared distances against what the ties' covariances promise
-  int64_t used = 0;     // ties that are not outliers
+  int64_t used = 0;     // ties between the epochs that are not outliers
 };
 
-// Distances are Mahalanobis distances of a tie's two points, s R C1 R^T s + C2 their covariance;
+// Distances are Mahalanobis distances of a tie's two points, s^2 R C1 R^T + C2 their covariance
+// between the epochs;
 // the variance is 2.366 times less than their median square (chi^2 with three degrees of freedom).
 // With `photos` what the photos' own errors explain, given `theta`, is taken off before: else a
 // photo that errs as a whole looks like many outliers.
 WeighedTies weigh_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1,
                        const PhotoErrors* photos, const Vector7& theta);
 
-// The mean Tukey loss (0 to 1) of the ties' distances at that variance.
+// The mean Tukey loss (0 to 1) of the distances at that variance, of ties between the epochs; of
+// those within one no similarity says anything. At least one tie is between the epochs.
 double tie_cost(std::span<const TiePoint> ties, const Sim3& t2_from_t1, double variance);
 
 }  // namespace vggtcd

@@ -22,16 +22,16 @@ std::vector<TiePoint> draws(int count) {
   std::vector<TiePoint> ties;
   for (int i = 0; i < count; ++i) {
     TiePoint& tie = ties.emplace_back();
-    tie.frame_t1 = i % 2;
-    tie.frame_t2 = (i / 2) % 2;
+    tie.first_photo = {true, i % 2};
+    tie.second_photo = {false, (i / 2) % 2};
     const Eigen::Vector3d axis = vector().normalized();
-    tie.covariance_t1 = 1e-4 * (Eigen::Matrix3d::Identity() + 20 * axis * axis.transpose());
-    tie.covariance_t2 = 4e-4 * (Eigen::Matrix3d::Identity() + 9 * axis * axis.transpose());
-    const Eigen::Matrix3d root1 = tie.covariance_t1.llt().matrixL();
-    const Eigen::Matrix3d root2 = tie.covariance_t2.llt().matrixL();
+    tie.first_covariance = 1e-4 * (Eigen::Matrix3d::Identity() + 20 * axis * axis.transpose());
+    tie.second_covariance = 4e-4 * (Eigen::Matrix3d::Identity() + 9 * axis * axis.transpose());
+    const Eigen::Matrix3d root1 = tie.first_covariance.llt().matrixL();
+    const Eigen::Matrix3d root2 = tie.second_covariance.llt().matrixL();
     const Eigen::Vector3d x = 3 * vector();
-    tie.in_t1 = x + root1 * vector();
-    tie.in_t2 = kT2FromT1 * x + root2 * vector();
+    tie.first = x + root1 * vector();
+    tie.second = kT2FromT1 * x + root2 * vector();
   }
   return ties;
 }
@@ -44,7 +44,7 @@ TEST(WeighTies, VarianceIsOneWhereTiesErrAsTheyPromise) {
   // The information is the inverse covariance of the difference, times a weight of at most 1.
   const Eigen::Matrix3d axes = kT2FromT1.scale * kT2FromT1.rotation;
   const Eigen::Matrix3d promised =
-      (axes * ties[0].covariance_t1 * axes.transpose() + ties[0].covariance_t2).inverse();
+      (axes * ties[0].first_covariance * axes.transpose() + ties[0].second_covariance).inverse();
   const double weight = weighed.points[0].information.trace() * weighed.variance / promised.trace();
   EXPECT_LT((weighed.points[0].information * weighed.variance - weight * promised).norm(),
             1e-9 * promised.norm());
@@ -54,7 +54,7 @@ TEST(WeighTies, VarianceIsOneWhereTiesErrAsTheyPromise) {
 
 TEST(WeighTies, OutliersCountNothing) {
   auto ties = draws(1000);
-  for (size_t i = 0; i < 300; ++i) ties[i].in_t2 += Eigen::Vector3d(3, -2, 1);
+  for (size_t i = 0; i < 300; ++i) ties[i].second += Eigen::Vector3d(3, -2, 1);
   const WeighedTies weighed = weigh_ties(ties, kT2FromT1, nullptr, Vector7::Zero());
   for (size_t i = 0; i < 300; ++i) EXPECT_EQ(weighed.points[i].information.norm(), 0) << i;
   EXPECT_GT(weighed.used, 650);
@@ -65,11 +65,12 @@ TEST(WeighTies, WhatAPhotoErrsAsAWholeIsTakenOffBefore) {
   // Photo 1 of T1 shows everything a unit too far along x. It errs by theta and by itself.
   auto ties = draws(1000);
   for (TiePoint& tie : ties) {
-    if (tie.frame_t1 == 1) tie.in_t2 += Eigen::Vector3d(1, 0, 0);
+    if (tie.first_photo.frame == 1) tie.second += Eigen::Vector3d(1, 0, 0);
   }
   PhotoErrors photos;
   photos.centers.assign(4, Eigen::Vector3d(0.3, 0.2, 0.1));
-  photos.groups_t1 = photos.frames_t1 = photos.frames_t2 = 2;
+  photos.groups = PhotoGroups({2, 2});
+  photos.known.assign(4, true);
   photos.mean = Eigen::VectorXd::Zero(28);
   photos.response = Eigen::MatrixXd::Zero(28, 7);
   photos.mean[7 + 3] = 0.4;
@@ -79,6 +80,21 @@ TEST(WeighTies, WhatAPhotoErrsAsAWholeIsTakenOffBefore) {
   EXPECT_GT(weighed.used, 990);
   EXPECT_NEAR(weighed.variance, 1, 0.2);
   EXPECT_GT(weigh_ties(ties, kT2FromT1, nullptr, Vector7::Zero()).variance, 20);
+}
+
+TEST(WeighTies, TiesOfOneEpochAreMappedWhole) {
+  for (const bool of_t1 : {true, false}) {
+    TiePoint tie = draws(1)[0];
+    tie.first_photo = {of_t1, 0};
+    tie.second_photo = {of_t1, 1};
+    tie.second = tie.first + Eigen::Vector3d(0.01, 0, 0);
+    tie.first_covariance = tie.second_covariance = 1e-4 * Eigen::Matrix3d::Identity();
+    const std::vector<TiePoint> ties(3, tie);
+    const PointPair point = weigh_ties(ties, kT2FromT1, nullptr, Vector7::Zero()).points[0];
+    const double scale = of_t1 ? kT2FromT1.scale : 1;
+    EXPECT_NEAR((point.first - point.second).norm(), 0.01 * scale, 1e-12);
+    EXPECT_LT((point.first - (of_t1 ? kT2FromT1 * tie.first : tie.first)).norm(), 1e-12);
+  }
 }
 
 TEST(WeighTies, NoTiesWeighNothing) {
