@@ -71,6 +71,12 @@ class Detect(unittest.TestCase):
         # The coarse stage is the paper's in either case.
         self.assertEqual(sim3["coarse"]["scale"],
                          json.loads((self.out / "sim3.json").read_text())["coarse"]["scale"])
+        alignment = json.loads((out / "summary.json").read_text())["alignment"]
+        robust = alignment["robust"]
+        self.assertIn(robust["compared_by"], ("tie_points", "surfaces"))
+        self.assertLessEqual(robust["ties_used"], robust["ties"])
+        costs = {candidate["name"]: candidate["cost"] for candidate in alignment["candidates"]}
+        self.assertEqual(min(costs, key=costs.get), "robust")
         change = np.load(out / "change.npz")
         for epoch, changed_label in (("t1", 1), ("t2", 2)):
             label = change["label_" + epoch]
