@@ -76,6 +76,9 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       result.robust = std::move(choice.robust);
       if (result.chosen == "robust") {
         result.uncertainty = {result.robust->covariance, result.robust->pivot_in_t2};
+      } else if (result.chosen == start.initial.name && start.uncertainty &&
+                 start.uncertainty->similarity.covariance.trace() > 0) {
+        result.uncertainty = start.uncertainty->similarity;
       }
       result.candidates = std::move(choice.candidates);
     });
