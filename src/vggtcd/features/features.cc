@@ -20,6 +20,9 @@ constexpr double kMaxRatio = 0.8;
 constexpr double kMaxAngleRad = 0.7;
 constexpr double kUnit = 512.0;  // a descriptor's length; products fit 32 bits
 constexpr double kMaxEpipolarError_px = 4.0;
+// OpenCV doubles the photo first, which puts pixel x at 2 x + 0.5, and halves what it finds there
+// (its later option enable_precise_upscale is for that).
+constexpr float kDoublingBias_px = 0.25f;
 constexpr int kBlock = 16;  // rows of a block of the product, so that its columns stay in L1
 
 cv::Mat gray_of(const Image& photo) {
@@ -60,7 +63,8 @@ Features extract_features(const Image& photo, int max_points, int max_side_px) {
   for (size_t i = 0; i < points.size(); ++i) {
     const cv::KeyPoint& p = points[i];
     // Pixel centres are integers: those of the two sizes meet at the corner, half a pixel before 0.
-    features.points.push_back({(p.pt.x + 0.5f) / shrink - 0.5f, (p.pt.y + 0.5f) / shrink - 0.5f,
+    const float u = p.pt.x - kDoublingBias_px, v = p.pt.y - kDoublingBias_px;
+    features.points.push_back({(u + 0.5f) / shrink - 0.5f, (v + 0.5f) / shrink - 0.5f,
                                p.size / shrink, static_cast<float>(p.angle * CV_PI / 180.0)});
     append_root_descriptor(descriptors.ptr<float>(static_cast<int>(i)), features.descriptors);
   }

@@ -159,6 +159,22 @@ TEST(MatchAll, FindsTheShiftOfAWallAndThatItIsAPlaneWithTheSameBitsForAnyThreads
   }
 }
 
+TEST(ExtractFeatures, FindsASpotWhereItIs) {
+  constexpr double kU = 101, kV = 83.5, kSigma_px = 4;
+  Image photo(200, 160);
+  for (int v = 0; v < photo.height; ++v) {
+    for (int u = 0; u < photo.width; ++u) {
+      const double away = std::hypot(u - kU, v - kV) / kSigma_px;
+      std::fill_n(photo.pixel(u, v), 3,
+                  static_cast<uint8_t>(std::lround(60 + 150 * std::exp(-0.5 * away * away))));
+    }
+  }
+  const Features features = extract_features(photo, 100);
+  ASSERT_FALSE(features.points.empty());
+  EXPECT_NEAR(features.points[0].u_px, kU, 0.05);
+  EXPECT_NEAR(features.points[0].v_px, kV, 0.05);
+}
+
 TEST(ExtractFeatures, OfAShrunkPhotoHasItsKeyPointsInTheOriginalsPixels) {
   const Image photo = wall(0, 0);
   const Features full = extract_features(photo, 5000), shrunk = extract_features(photo, 5000, 160);
