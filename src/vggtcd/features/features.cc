@@ -41,38 +41,6 @@ void append_root_descriptor(const float* sift, std::vector<int16_t>& out) {
   }
 }
 
-}  // namespace
-
-Features extract_features(const Image& photo, int max_points, int max_side_px) {
-  constexpr double kContrast = 0.02, kEdge = 10, kSigma = 1.6;
-  std::vector<cv::KeyPoint> points;
-  cv::Mat descriptors;
-  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, kContrast, kEdge, kSigma);
-  cv::Mat gray = gray_of(photo);
-  const float shrink = std::min(
-      1.0f, static_cast<float>(max_side_px) / static_cast<float>(std::max(gray.cols, gray.rows)));
-  if (shrink < 1) cv::resize(gray, gray, {}, shrink, shrink, cv::INTER_AREA);
-  sift->detect(gray, points);
-  // The largest, not the strongest: they are found again from farther away.
-  std::stable_sort(points.begin(), points.end(),
-                   [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.size > b.size; });
-  if (points.size() > static_cast<size_t>(max_points))
-    points.resize(static_cast<size_t>(max_points));
-  sift->compute(gray, points, descriptors);
-  Features features;
-  for (size_t i = 0; i < points.size(); ++i) {
-    const cv::KeyPoint& p = points[i];
-    // Pixel centres are integers: those of the two sizes meet at the corner, half a pixel before 0.
-    const float u = p.pt.x - kDoublingBias_px, v = p.pt.y - kDoublingBias_px;
-    features.points.push_back({(u + 0.5f) / shrink - 0.5f, (v + 0.5f) / shrink - 0.5f,
-                               p.size / shrink, static_cast<float>(p.angle * CV_PI / 180.0)});
-    append_root_descriptor(descriptors.ptr<float>(static_cast<int>(i)), features.descriptors);
-  }
-  return features;
-}
-
-namespace {
-
 int32_t dot(const int16_t* a, const int16_t* b) {
   int32_t sum = 0;
   for (int i = 0; i < kDescriptorSize; ++i) sum += a[i] * b[i];
@@ -148,6 +116,34 @@ PhotoPair verified(int first, int second, const std::vector<Features>& features,
 }
 
 }  // namespace
+
+Features extract_features(const Image& photo, int max_points, int max_side_px) {
+  constexpr double kContrast = 0.02, kEdge = 10, kSigma = 1.6;
+  std::vector<cv::KeyPoint> points;
+  cv::Mat descriptors;
+  const cv::Ptr<cv::SIFT> sift = cv::SIFT::create(0, 3, kContrast, kEdge, kSigma);
+  cv::Mat gray = gray_of(photo);
+  const float shrink = std::min(
+      1.0f, static_cast<float>(max_side_px) / static_cast<float>(std::max(gray.cols, gray.rows)));
+  if (shrink < 1) cv::resize(gray, gray, {}, shrink, shrink, cv::INTER_AREA);
+  sift->detect(gray, points);
+  // The largest, not the strongest: they are found again from farther away.
+  std::stable_sort(points.begin(), points.end(),
+                   [](const cv::KeyPoint& a, const cv::KeyPoint& b) { return a.size > b.size; });
+  if (points.size() > static_cast<size_t>(max_points))
+    points.resize(static_cast<size_t>(max_points));
+  sift->compute(gray, points, descriptors);
+  Features features;
+  for (size_t i = 0; i < points.size(); ++i) {
+    const cv::KeyPoint& p = points[i];
+    // Pixel centres are integers: those of the two sizes meet at the corner, half a pixel before 0.
+    const float u = p.pt.x - kDoublingBias_px, v = p.pt.y - kDoublingBias_px;
+    features.points.push_back({(u + 0.5f) / shrink - 0.5f, (v + 0.5f) / shrink - 0.5f,
+                               p.size / shrink, static_cast<float>(p.angle * CV_PI / 180.0)});
+    append_root_descriptor(descriptors.ptr<float>(static_cast<int>(i)), features.descriptors);
+  }
+  return features;
+}
 
 std::vector<Features> extract_features(const std::vector<Image>& photos, int max_points,
                                        ProgressStage& stage, int max_side_px) {

@@ -15,6 +15,7 @@
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/pipeline/job_plan.h"
+#include "vggtcd/scene/frame_image.h"
 
 namespace vggtcd {
 namespace {
@@ -45,9 +46,7 @@ EpochPhotos prediction_of(const std::string& source, ProgressSink& progress) {
   EpochPhotos epoch;
   const auto given = std::make_shared<const Reconstruction>(read_reconstruction(source, progress));
   for (int frame = 0; frame < given->num_frames(); ++frame) {
-    auto image = std::make_shared<Image>(given->width, given->height);
-    const auto color = given->frame_color(frame);
-    std::copy(color.begin(), color.end(), image->rgb.begin());
+    auto image = std::make_shared<Image>(frame_image(*given, frame));
     epoch.photos.push_back({source, given->views[static_cast<size_t>(frame)].name, image});
   }
   epoch.given = given;

@@ -13,7 +13,7 @@
 #include "vggtcd/core/progress.h"
 #include "vggtcd/features/features.h"
 #include "vggtcd/scene/confidence.h"
-#include "vggtcd/scene/image.h"
+#include "vggtcd/scene/frame_image.h"
 #include "vggtcd/scene/keyframes.h"
 #include "vggtcd/scene/view_overlap.h"
 
@@ -82,11 +82,7 @@ std::optional<Lifted> lift(const Reconstruction& r, int frame, const KeyPoint& p
 
 std::vector<Photo> photos_of(const Reconstruction& r, const std::vector<int>& frames) {
   std::vector<Image> images;
-  for (const int frame : frames) {
-    Image& image = images.emplace_back(r.width, r.height);
-    const auto color = r.frame_color(frame);
-    std::copy(color.begin(), color.end(), image.rgb.begin());
-  }
+  for (const int frame : frames) images.push_back(frame_image(r, frame));
   ProgressStage silent(silent_progress(), "key points");
   std::vector<Features> features = extract_features(images, kMaxKeyPoints, silent, kMaxSide_px);
   const double min_confidence = confidence_percentile(r, kMinConfidence);
@@ -113,22 +109,22 @@ std::vector<Eigen::Vector2f> expected(const Photo& photo, const Sim3& other_from
 }
 
 // One epoch's chosen photos.
-struct EpochPhotos {
+struct ChosenPhotos {
   const Reconstruction& reconstruction;
   bool is_t1;
   std::vector<int> frames;
   std::vector<Photo> photos;
 };
 
-EpochPhotos choose_photos(const Reconstruction& r, bool is_t1, int photos_per_epoch) {
+ChosenPhotos choose_photos(const Reconstruction& r, bool is_t1, int photos_per_epoch) {
   const std::vector<int> frames = select_keyframes(r.num_frames(), photos_per_epoch);
   return {r, is_t1, frames, photos_of(r, frames)};
 }
 
-using Pairs = std::set<std::pair<size_t, size_t>>;  // of positions in EpochPhotos
+using Pairs = std::set<std::pair<size_t, size_t>>;  // of positions in ChosenPhotos
 
 // Of each photo of `from` the photos of `to` that overlap it most, without itself.
-void add_overlapping(const EpochPhotos& from, const EpochPhotos& to, const Sim3& to_from_from,
+void add_overlapping(const ChosenPhotos& from, const ChosenPhotos& to, const Sim3& to_from_from,
                      int per_photo, Pairs& pairs) {
   const auto best = overlapping_views(from.reconstruction, to.reconstruction, to_from_from,
                                       to.reconstruction.num_frames());
@@ -146,13 +142,13 @@ void add_overlapping(const EpochPhotos& from, const EpochPhotos& to, const Sim3&
   }
 }
 
-void append_ties(const EpochPhotos& first, const EpochPhotos& second, const Sim3& second_from_first,
-                 const Pairs& chosen, std::vector<TiePoint>& ties) {
+void append_ties(const ChosenPhotos& first, const ChosenPhotos& second,
+                 const Sim3& second_from_first, const Pairs& chosen, std::vector<TiePoint>& ties) {
   const std::vector<std::pair<size_t, size_t>> pairs(chosen.begin(), chosen.end());
   const int width = std::max(first.reconstruction.width, second.reconstruction.width);
   const auto radius_px = static_cast<float>(kSearchShare * width);
   const Sim3 first_from_second = second_from_first.inverse();
-  const auto view_of = [](const EpochPhotos& epoch, const Photo& photo) -> const View& {
+  const auto view_of = [](const ChosenPhotos& epoch, const Photo& photo) -> const View& {
     return epoch.reconstruction.views[static_cast<size_t>(photo.frame)];
   };
   std::vector<std::vector<TiePoint>> found(pairs.size());
@@ -182,8 +178,8 @@ void append_ties(const EpochPhotos& first, const EpochPhotos& second, const Sim3
 
 std::vector<TiePoint> find_tie_points(const Reconstruction& before, const Reconstruction& after,
                                       const Sim3& t2_from_t1, int photos_per_epoch) {
-  const EpochPhotos t1 = choose_photos(before, true, photos_per_epoch);
-  const EpochPhotos t2 = choose_photos(after, false, photos_per_epoch);
+  const ChosenPhotos t1 = choose_photos(before, true, photos_per_epoch);
+  const ChosenPhotos t2 = choose_photos(after, false, photos_per_epoch);
   Pairs across, within_t1, within_t2;
   add_overlapping(t1, t2, t2_from_t1, kPairsPerPhoto, across);
   add_overlapping(t2, t1, t2_from_t1.inverse(), kPairsPerPhoto, across);
