@@ -6,6 +6,7 @@
 #include <oneapi/dnnl/dnnl.hpp>
 
 #include "vggtcd/core/timer.h"
+#include "vggtcd/nn/product.h"
 
 namespace vggtcd::bench {
 namespace {
@@ -27,7 +28,11 @@ double measure(int64_t rows, int64_t in, int64_t out, bool bf16) {
   const memory::desc source_desc({rows, in}, type, memory::format_tag::ab);
   const memory::desc weights_desc({in, out}, type, memory::format_tag::any);
   const memory::desc target_desc({rows, out}, type, memory::format_tag::ab);
+#if DNNL_VERSION_MAJOR >= 3
+  const dnnl::matmul::primitive_desc description(engine, source_desc, weights_desc, target_desc);
+#else
   const dnnl::matmul::primitive_desc description({source_desc, weights_desc, target_desc}, engine);
+#endif
   const memory source(source_desc, engine), weights(description.weights_desc(), engine),
       target(target_desc, engine);
   fill(source);
@@ -48,6 +53,7 @@ double measure(int64_t rows, int64_t in, int64_t out, bool bf16) {
 }  // namespace
 
 std::vector<GemmRate> measure_gemm_rates(bool bf16) {
+  limit_onednn_to_cpu_level();
   std::vector<GemmRate> rates = {{10410, 1024, 3072, 0},
                                  {10410, 1024, 1024, 0},
                                  {10410, 1024, 4096, 0},

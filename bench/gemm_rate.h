@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The yardstick of the network's benchmarks: the rate of oneDNN's matrix product, weights packed,
-// on the shapes of VGGT-1B's linear layers, with as many threads as the machine has processors.
+// on the shapes of VGGT-1B's linear layers, with as many threads as the machine has processors, at
+// the instruction set of VGGTCD_ISA.
 #pragma once
 
 #include <cstdint>

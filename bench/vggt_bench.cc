@@ -2,8 +2,8 @@
 // The whole network, VGGT-1B with weights of the recipe: time against the time that oneDNN's best
 // rate on the network's own products, measured in the same run, would need for its operations.
 //
-//   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16] [--weights FILE]
-//   [--points]
+//   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16_weights|bf16]
+//   [--weights FILE] [--points]          VGGTCD_ISA chooses the instruction set
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +12,7 @@
 
 #include "bench/gemm_rate.h"
 #include "tests/support/weight_recipe.h"
+#include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/vggt/model.h"
@@ -65,7 +66,7 @@ void print_stages(const Prediction& prediction, const VggtCost& cost, double tot
 void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool points,
          double gemm_gflops) {
   const ImageBatch images = make_images(frames, height, width);
-  const VggtRun shape{frames, height, width, model.precision() == Precision::kBf16, true, points};
+  const VggtRun shape{frames, height, width, model.precision(), true, points};
   reset_peak_memory();
   const Timer timer;
   const Prediction prediction = model.reconstruct(images);
@@ -87,26 +88,32 @@ void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool 
 int main(int argc, char** argv) {
   CLI::App app("VGGT-1B on synthetic photos against the rate of oneDNN's matrix product");
   std::vector<int64_t> views{10};
-  std::string size = "518x392", precision = "bf16", weights;
+  std::string size = "518x392", asked = "auto", weights;
   bool points = false;
   app.add_option("--views", views, "numbers of photos, one pass each")->delimiter(',');
   app.add_option("--size", size, "WIDTHxHEIGHT of a photo, multiples of 14");
-  app.add_option("--precision", precision)->check(CLI::IsMember({"f32", "bf16"}));
+  app.add_option("--precision", asked)
+      ->check(CLI::IsMember({"auto", "f32", "bf16_weights", "bf16"}));
   app.add_option("--weights", weights, "a weights file instead of the recipe; its load is timed");
   app.add_flag("--points", points, "the point head too");
   CLI11_PARSE(app, argc, argv);
   try {
-    const bool bf16 = precision == "bf16";
+    Precision precision = Precision::kAuto;
+    for (const auto& entry : enum_names(precision)) {
+      if (entry.name == asked) precision = entry.value;
+    }
+    precision = resolve_precision(precision);
+    const bool bf16 = product_types(precision).compute == DType::kBF16;
     const size_t cross = size.find('x');
     const int64_t width = std::stoll(size), height = std::stoll(size.substr(cross + 1));
     const auto rates = bench::measure_gemm_rates(bf16);
     for (const auto& rate : rates) {
-      fmt::print("oneDNN {} [{}, {}] x [{}, {}]: {:.0f} GFLOP/s\n", precision, rate.rows, rate.in,
-                 rate.in, rate.out, rate.gflops);
+      fmt::print("oneDNN {} [{}, {}] x [{}, {}]: {:.0f} GFLOP/s\n", bf16 ? "bf16" : "f32",
+                 rate.rows, rate.in, rate.in, rate.out, rate.gflops);
     }
-    const Vggt model = load(
-        weights, {.precision = bf16 ? Precision::kBf16 : Precision::kF32, .point_head = points});
-    fmt::print("{}, {} threads\n", precision, num_threads());
+    const Vggt model = load(weights, {.precision = precision, .point_head = points});
+    fmt::print("precision {} on {}, {} threads\n", enum_to_string(precision),
+               enum_to_string(cpu_level()), num_threads());
     for (const int64_t frames : views) {
       run(model, frames, height, width, points, bench::best_gflops(rates));
     }

@@ -126,7 +126,7 @@ void add_benchmark(Program& program) {
       ->capture_default_str()
       ->group("WAT");
   add_field(command, "precision", arguments->precision,
-            "with --weights: of the network; auto takes bf16 where the processor has it");
+            fmt::format("With --weights: {}", kPrecisionHelp));
   command->get_option("--precision")->group("WAT");
   command->footer(
       "Writes OUT/benchmark.{md,csv,json}, ablation.{csv,svg}, change.csv, instances.csv and\n"

@@ -49,7 +49,7 @@ void reconstruct(const Arguments& arguments, ProgressSink& progress) {
   const VggtRun run{.frames = images.frames,
                     .height = images.height,
                     .width = images.width,
-                    .bf16 = precision == Precision::kBf16,
+                    .precision = precision,
                     .depth_head = arguments.network.depth_head,
                     .point_head = arguments.network.point_head};
   const MemoryPlan plan = plan_memory(config, run, available_memory_bytes());

@@ -6,20 +6,10 @@
 #include <cstdint>
 
 #include "vggtcd/nn/attention_kernel.h"
-#include "vggtcd/nn/simd_math.h"
+#include "vggtcd/nn/tile.h"
 
 namespace vggtcd {
 namespace {
-
-// A vector type whose lanes multiply single f32 words.
-template <typename Simd>
-struct F32Words : Simd {
-  using V = typename Simd::V;
-  static constexpr int kPerWord = 1;
-  static V dot(V acc, V a, V b) { return Simd::fma(a, b, acc); }
-  // The bound keeps minus infinity, a score that overflowed, from becoming NaN.
-  static V exp2(V x) { return exp2_f32<Simd>(Simd::max(Simd::set(-1000.0f), x)); }
-};
 
 // S: vector type with dot(), exp2() and kPerWord; T: element type of q and out.
 template <typename S, typename T, int kHeadDim>
@@ -43,32 +33,11 @@ struct AttentionKernel {
     float* sum;        // [kQueries]
   };
 
-  // acc[row][column] = sum over steps of words[row * kRowStride + step * kStepStride] times
-  // vectors[step, column].
-  template <int kRowStride, int kStepStride>
-  [[gnu::always_inline]] static inline void multiply(int64_t steps, const float* words,
-                                                     const float* vectors,
-                                                     V (&acc)[kRows][kColumns]) {
-    for (int r = 0; r < kRows; ++r) {
-      for (int c = 0; c < kColumns; ++c) acc[r][c] = S::zero();
-    }
-    for (int64_t step = 0; step < steps; ++step) {
-      V v[kColumns];
-      for (int c = 0; c < kColumns; ++c) v[c] = S::load(vectors + c * kLanes);
-      for (int r = 0; r < kRows; ++r) {
-        const V word = S::set(words[r * kRowStride]);
-        for (int c = 0; c < kColumns; ++c) acc[r][c] = S::dot(acc[r][c], v[c], word);
-      }
-      words += kStepStride;
-      vectors += kQueries;
-    }
-  }
-
   // scores [kRows, kQueries] of kRows keys, and their maximum over the keys.
   static void score_tile(const Group& group, const float* keys, float* scores,
                          V (&largest)[kColumns]) {
     V acc[kRows][kColumns];
-    multiply<kKeySteps, 1>(kKeySteps, keys, group.q, acc);
+    multiply_tile<S>(kKeySteps, keys, kKeySteps, 1, group.q, acc);
     for (int c = 0; c < kColumns; ++c) {
       V most = acc[0][c];
       for (int r = 1; r < kRows; ++r) most = S::max(most, acc[r][c]);
@@ -113,7 +82,7 @@ struct AttentionKernel {
                          const float* probabilities) {
     for (int d = 0; d < kHeadDim; d += kRows) {
       V acc[kRows][kColumns];
-      multiply<1, kHeadDim>(steps, values + d, probabilities, acc);
+      multiply_tile<S>(steps, values + d, 1, kHeadDim, probabilities, acc);
       for (int r = 0; r < kRows; ++r) {
         for (int c = 0; c < kColumns; ++c) {
           float* at = group.out + (d + r) * kQueries + c * kLanes;

@@ -3,10 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
 #include <tuple>
 
+#include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/nn/conv3x3.h"
+#include "vggtcd/nn/product.h"
 #include "vggtcd/nn/test_support.h"
 
 namespace vggtcd {
@@ -40,37 +44,88 @@ void expect_near_all(const std::vector<float>& found, const std::vector<double>&
   }
 }
 
-using Shape = std::tuple<int64_t, int64_t, int64_t>;  // rows, in, out
+// Every product that a Linear may run on: an instruction set and the numbers. Those in f32
+// arithmetic; bf16 arithmetic has a test of its own.
+struct Kind {
+  const char* name;
+  CpuLevel level;
+  ProductTypes types;
+};
 
-class LinearShapes : public ::testing::TestWithParam<Shape> {};
+constexpr ProductTypes kBf16Kept{DType::kF32, DType::kBF16};
+constexpr Kind kKinds[] = {{"F32Reference", CpuLevel::kReference, {}},
+                           {"F32Avx2", CpuLevel::kAvx2, {}},
+                           {"F32Avx512", CpuLevel::kAvx512, {}},
+                           {"Bf16KeptAvx2", CpuLevel::kAvx2, kBf16Kept},
+                           {"Bf16KeptAvx512", CpuLevel::kAvx512, kBf16Kept}};
 
-TEST_P(LinearShapes, MatchesNaiveLoopsWithGapsBetweenRows) {
-  const auto [rows, in, out] = GetParam();
-  const int64_t x_stride = in + 3, y_stride = out + 5;
-  const auto weight = random_values<float>(in * out, 1), bias = random_values<float>(out, 2);
-  auto x = random_values<float>(rows * x_stride, 3);
-  std::vector<float> y(static_cast<size_t>(rows * y_stride), -7.0f);
-  const Linear linear(weight, bias, in, out, {});
-  linear.run(rows, Rows(x.data(), x_stride), Rows(y.data(), y_stride));
-  const auto expected = naive_linear(rows, in, out, x.data(), x_stride, weight, bias);
-  for (int64_t r = 0; r < rows; ++r) {
-    const auto row = y.begin() + r * y_stride;
-    expect_near_all({row, row + out},
-                    {expected.begin() + r * out, expected.begin() + (r + 1) * out},
-                    accumulation_bound(in));
-    for (int64_t gap = out; gap < y_stride; ++gap) ASSERT_EQ(row[gap], -7.0f);
+class LinearKinds : public ::testing::TestWithParam<Kind> {
+ protected:
+  void SetUp() override {
+    if (GetParam().level > detected_cpu_level()) GTEST_SKIP() << "not on this processor";
+    level_.emplace(GetParam().level);
+  }
+  ProductTypes types() const { return GetParam().types; }
+  // Values of a weight as this kind keeps them.
+  std::vector<float> kept(std::vector<float> weight) const {
+    if (types().weights == DType::kBF16) {
+      for (float& value : weight) value = float_from_bfloat16(bfloat16_from_float(value));
+    }
+    return weight;
+  }
+
+ private:
+  std::optional<ScopedCpuLevel> level_;
+};
+
+std::string kind_name(const ::testing::TestParamInfo<Kind>& kind) { return kind.param.name; }
+
+INSTANTIATE_TEST_SUITE_P(All, LinearKinds, ::testing::ValuesIn(kKinds), kind_name);
+
+struct Shape {
+  int64_t rows, in, out;
+};
+
+TEST_P(LinearKinds, MatchesNaiveLoopsWithGapsBetweenRows) {
+  // Odd sizes, the network's, and those around the vectors, panels and blocks of the kernels.
+  for (const auto& [rows, in, out] : {Shape{1, 1, 1},
+                                      {1, 9, 256},
+                                      {5, 256, 9},
+                                      {127, 588, 33},
+                                      {128, 64, 192},
+                                      {42, 128, 384},
+                                      {3, 1024, 2},
+                                      {4, 161, 7},
+                                      {9, 160, 23},
+                                      {8, 255, 24},
+                                      {7, 257, 25},
+                                      {6, 321, 47},
+                                      {17, 513, 48},
+                                      {2, 20, 49},
+                                      {11, 159, 72},
+                                      {12, 320, 97}}) {
+    SCOPED_TRACE(fmt::format("{} x {} x {}", rows, in, out));
+    const int64_t x_stride = in + 3, y_stride = out + 5;
+    const auto weight = random_values<float>(in * out, 1), bias = random_values<float>(out, 2);
+    auto x = random_values<float>(rows * x_stride, 3);
+    std::vector<float> y(static_cast<size_t>(rows * y_stride), -7.0f);
+    const Linear linear(weight, bias, in, out, {.types = types()});
+    linear.run(rows, Rows(x.data(), x_stride), Rows(y.data(), y_stride));
+    const auto expected = naive_linear(rows, in, out, x.data(), x_stride, kept(weight), bias);
+    for (int64_t r = 0; r < rows; ++r) {
+      const auto row = y.begin() + r * y_stride;
+      expect_near_all({row, row + out},
+                      {expected.begin() + r * out, expected.begin() + (r + 1) * out},
+                      accumulation_bound(in));
+      for (int64_t gap = out; gap < y_stride; ++gap) ASSERT_EQ(row[gap], -7.0f);
+    }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(OddAndNetworkSizes, LinearShapes,
-                         ::testing::Values(Shape{1, 1, 1}, Shape{1, 9, 256}, Shape{5, 256, 9},
-                                           Shape{127, 588, 33}, Shape{128, 64, 192},
-                                           Shape{42, 128, 384}, Shape{3, 1024, 2}));
-
-TEST(Linear, GeluIsTheExactOne) {
+TEST_P(LinearKinds, GeluIsTheExactOne) {
   // The tanh approximation is off by up to 5e-4, this bound is 250 times smaller.
   const std::vector<float> identity{1.0f};
-  const Linear linear(identity, {}, 1, 1, {.activation = Activation::kGelu});
+  const Linear linear(identity, {}, 1, 1, {.types = types(), .activation = Activation::kGelu});
   std::vector<float> x, y(kRowBlock);
   for (int64_t i = 0; i < kRowBlock; ++i) x.push_back(-8.0f + static_cast<float>(i) * 0.125f);
   linear.run(kRowBlock, Rows(x.data(), 1), Rows(y.data(), 1));
@@ -79,37 +134,76 @@ TEST(Linear, GeluIsTheExactOne) {
   }
 }
 
-TEST(Linear, ReluClampsAtZero) {
+TEST_P(LinearKinds, ReluClampsAtZero) {
   const std::vector<float> identity{1.0f};
-  const Linear linear(identity, {}, 1, 1, {.activation = Activation::kRelu});
+  const Linear linear(identity, {}, 1, 1, {.types = types(), .activation = Activation::kRelu});
   std::vector<float> x{-2, -0.5f, 0, 3}, y(4);
   linear.run(4, Rows(x.data(), 1), Rows(y.data(), 1));
   EXPECT_EQ(y, (std::vector<float>{0, 0, 0, 3}));
 }
 
-TEST(Linear, GammaScalesProductAndBiasAndAddsToY) {
-  const int64_t rows = 7, in = 65, out = 48;
+TEST_P(LinearKinds, ActivationComesAfterTheWholeSum) {
+  // 700 input channels are several blocks of every kernel; 30 channels fill no panel.
+  const int64_t rows = 6, in = 700, out = 30;
   const auto weight = random_values<float>(in * out, 1), bias = random_values<float>(out, 2);
-  const auto gamma = random_values<float>(out, 4);
-  auto x = random_values<float>(rows * in, 3), y = random_values<float>(rows * out, 5);
-  auto expected = naive_linear(rows, in, out, x.data(), in, weight, bias);
-  for (size_t i = 0; i < expected.size(); ++i) {
-    expected[i] = y[i] + gamma[i % static_cast<size_t>(out)] * expected[i];
+  auto x = random_values<float>(rows * in, 3);
+  std::vector<float> y(static_cast<size_t>(rows * out));
+  Linear(weight, bias, in, out, {.types = types(), .activation = Activation::kRelu})
+      .run(rows, Rows(x.data(), in), Rows(y.data(), out));
+  auto expected = naive_linear(rows, in, out, x.data(), in, kept(weight), bias);
+  for (double& value : expected) value = std::max(value, 0.0);
+  expect_near_all(y, expected, accumulation_bound(in));
+}
+
+TEST_P(LinearKinds, GammaScalesProductAndBiasAndAddsToY) {
+  for (const int64_t in : {65, 600}) {
+    const int64_t rows = 7, out = 52;
+    const auto weight = random_values<float>(in * out, 1), bias = random_values<float>(out, 2);
+    const auto gamma = random_values<float>(out, 4);
+    auto x = random_values<float>(rows * in, 3), y = random_values<float>(rows * out, 5);
+    auto expected = naive_linear(rows, in, out, x.data(), in, kept(weight), bias);
+    for (size_t i = 0; i < expected.size(); ++i) {
+      expected[i] = y[i] + gamma[i % static_cast<size_t>(out)] * expected[i];
+    }
+    Linear(weight, bias, in, out, {.types = types(), .gamma = gamma})
+        .run(rows, Rows(x.data(), in), Rows(y.data(), out));
+    expect_near_all(y, expected, accumulation_bound(in));
   }
-  Linear(weight, bias, in, out, {.gamma = gamma})
+}
+
+TEST_P(LinearKinds, AccumulateAddsToY) {
+  const int64_t rows = 3, in = 31, out = 16;
+  const auto weight = random_values<float>(in * out, 1);
+  auto x = random_values<float>(rows * in, 3), y = random_values<float>(rows * out, 5);
+  auto expected = naive_linear(rows, in, out, x.data(), in, kept(weight), {});
+  for (size_t i = 0; i < expected.size(); ++i) expected[i] += y[i];
+  Linear(weight, {}, in, out, {.types = types(), .accumulate = true})
       .run(rows, Rows(x.data(), in), Rows(y.data(), out));
   expect_near_all(y, expected, accumulation_bound(in));
 }
 
-TEST(Linear, AccumulateAddsToY) {
-  const int64_t rows = 3, in = 31, out = 16;
+TEST_P(LinearKinds, WeightsKeptInBf16TakeHalfTheMemory) {
+  const int64_t in = 1024, out = 1024;
   const auto weight = random_values<float>(in * out, 1);
-  auto x = random_values<float>(rows * in, 3), y = random_values<float>(rows * out, 5);
-  auto expected = naive_linear(rows, in, out, x.data(), in, weight, {});
-  for (size_t i = 0; i < expected.size(); ++i) expected[i] += y[i];
-  Linear(weight, {}, in, out, {.accumulate = true})
-      .run(rows, Rows(x.data(), in), Rows(y.data(), out));
-  expect_near_all(y, expected, accumulation_bound(in));
+  const auto packed =
+      static_cast<double>(Linear(weight, {}, in, out, {.types = types()}).packed_bytes());
+  const auto exact = static_cast<double>(bytes_of(types().weights, in, out));
+  EXPECT_GE(packed, exact);
+  EXPECT_LE(packed, 1.05 * exact);
+}
+
+TEST(PanelProduct, BitsOfARowDoNotDependOnTheRowsAroundIt) {
+  if (detected_cpu_level() < CpuLevel::kAvx2) GTEST_SKIP() << "this processor has no AVX2";
+  const int64_t in = 700, out = 50;
+  const auto weight = random_values<float>(in * out, 1);
+  auto x = random_values<float>(kRowBlock * in, 3);
+  const Linear linear(weight, {}, in, out, {.types = kBf16Kept});
+  std::vector<float> together(static_cast<size_t>(kRowBlock * out)), alone(together.size());
+  linear.run(kRowBlock, Rows(x.data(), in), Rows(together.data(), out));
+  for (int64_t row = 0; row < kRowBlock; ++row) {
+    linear.run(1, Rows(x.data() + row * in, in), Rows(alone.data() + row * out, out));
+  }
+  EXPECT_EQ(together, alone);
 }
 
 TEST(Linear, Bf16OperandsWithF32SumsGiveTheProductOfTheRoundedNumbers) {
@@ -120,11 +214,26 @@ TEST(Linear, Bf16OperandsWithF32SumsGiveTheProductOfTheRoundedNumbers) {
   auto x = random_values<uint16_t>(rows * in, 3);
   std::vector<float> x_f32, y(static_cast<size_t>(rows * out));
   for (const uint16_t value : x) x_f32.push_back(float_from_bfloat16(value));
-  Linear(weight, bias, in, out, {.compute = DType::kBF16})
+  Linear(weight, bias, in, out, {.types = {DType::kBF16, DType::kBF16}})
       .run(rows, Rows(x.data(), in), Rows(y.data(), out));
   for (float& value : weight) value = float_from_bfloat16(bfloat16_from_float(value));
   expect_near_all(y, naive_linear(rows, in, out, x_f32.data(), in, weight, bias),
                   accumulation_bound(in));
+}
+
+TEST(Linear, NamesTheImplementationOfItsPrimitives) {
+  // Whatever runs the product of an odd shape in f32, oneDNN or not, has said so.
+  const ScopedCpuLevel reference(CpuLevel::kReference);
+  const std::vector<float> weight(331 * 7, 1.0f);
+  std::vector<float> x(331), y(7);
+  Linear(weight, {}, 331, 7, {}).run(1, Rows(x.data(), 331), Rows(y.data(), 7));
+  const std::vector<std::string> lines = onednn_primitives();
+  const auto with = [&](const std::string& text) {
+    return std::count_if(lines.begin(), lines.end(),
+                         [&](const std::string& line) { return line.starts_with(text); });
+  };
+  EXPECT_EQ(with("matmul 1x331x7 f32: "), 1);
+  EXPECT_EQ(with("reorder 331x7 f32 to f32: "), 1);
 }
 
 TEST(Linear, WeightsOfEveryFloatingTypeMeanTheSame) {

@@ -28,8 +28,7 @@ struct ReconstructorOptions {
     field("frame_side", self.frame_side,
           "Longer side of a frame, px, a multiple of 14; 518 is what the network was trained with. "
           "Smaller is faster and coarser. A prediction file on one side decides it.");
-    field("precision", self.precision,
-          "Of the network: auto takes bf16 where the processor has it.");
+    field("precision", self.precision, kPrecisionHelp);
   };
   void validate() const;
 };

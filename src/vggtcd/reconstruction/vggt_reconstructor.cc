@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <optional>
 
+#include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/weight_file.h"
+#include "vggtcd/nn/product_rate.h"
 #include "vggtcd/scene/keyframes.h"
 #include "vggtcd/vggt/memory_plan.h"
 #include "vggtcd/vggt/preprocess.h"
@@ -143,7 +145,7 @@ std::string VggtReconstructor::fingerprint() const {
   return fmt::format("vggt 2; weights {} {} {}; keyframes {}; side {}; precision {}",
                      std::filesystem::absolute(options_.weights).string(), failed ? 0 : size,
                      time.time_since_epoch().count(), options_.keyframes, options_.frame_side_px,
-                     enum_to_string(options_.network.precision));
+                     enum_to_string(resolve_precision(options_.network.precision)));
 }
 
 ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
@@ -160,9 +162,11 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
   plan.frames_joint = passes.joint;
   plan.width = first.width;
   plan.height = first.height;
-  const bool bf16 = resolve_precision(options_.network.precision) == Precision::kBf16;
-  // Measured with the full network, 10 frames of 518 x 392 px, on two cores of a Zen 5.
-  const double flop_per_thread_second = bf16 ? 3.2e11 : 2.0e11;
+  const Precision precision = resolve_precision(options_.network.precision);
+  const double product_flop_per_s = measure_product_rate(product_types(precision));
+  // Of the rate of products alone, by all that the network does (docs/performance.md).
+  constexpr double kNetworkShare = 0.85;
+  const double flop_per_s = kNetworkShare * product_flop_per_s;
   constexpr double kReadSecondsPerPhoto = 0.05, kWeightsSeconds = 1.5;
   constexpr double kFrameSeconds = 0.05;  // outside of the products, of a small network
   plan.stages = {{"read photos", kReadSecondsPerPhoto * (plan.frames_before + plan.frames_after)},
@@ -175,14 +179,16 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
   for (const Pass& pass :
        {Pass{"before", passes.before}, Pass{"after", passes.after}, Pass{"joint", passes.joint}}) {
     if (pass.frames == 0) continue;
-    const VggtRun run{
-        .frames = pass.frames, .height = first.height, .width = first.width, .bf16 = bf16};
+    const VggtRun run{.frames = pass.frames,
+                      .height = first.height,
+                      .width = first.width,
+                      .precision = precision};
     const VggtCost cost = cost_of(config, run);
     flop += cost.total_flop();
     plan.memory_bytes = std::max(plan.memory_bytes, memory_of(config, run).total());
     const auto add = [&](std::string_view stage, double stage_flop, double others) {
-      plan.stages.push_back({fmt::format("{}: {}", pass.name, stage),
-                             others + stage_flop / (flop_per_thread_second * num_threads())});
+      plan.stages.push_back(
+          {fmt::format("{}: {}", pass.name, stage), others + stage_flop / flop_per_s});
     };
     const double cameras = cost.flop_of(VggtStage::kCameras);
     const double depth = cost.flop_of(VggtStage::kDepth);
@@ -191,10 +197,10 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
     add(stage_name(VggtStage::kDepth), depth, kFrameSeconds * pass.frames);
   }
   plan.note = fmt::format(
-      "vggt: {:.1f} TFLOP in {} passes, {}; time at {:.1f} TFLOP/s per thread, measured on a Zen 5 "
-      "server",
-      flop * 1e-12, (passes.before > 0) + (passes.after > 0) + 1, bf16 ? "bf16" : "f32",
-      flop_per_thread_second * 1e-12);
+      "vggt: {:.1f} TFLOP in {} passes, precision {} on {}; products measured here: {:.2f} TFLOP/s "
+      "on {} threads",
+      flop * 1e-12, (passes.before > 0) + (passes.after > 0) + 1, enum_to_string(precision),
+      enum_to_string(cpu_level()), product_flop_per_s * 1e-12, num_threads());
   return plan;
 }
 
@@ -213,12 +219,11 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
   const Frames& after = epochs.second;
   const PassSizes passes_to_run = pass_sizes(photos, options_.keyframes);
   const Image& model = before.images.front();
-  const bool bf16 = resolve_precision(options_.network.precision) == Precision::kBf16;
   throw_unless_fits(plan_memory(config,
                                 {.frames = passes_to_run.largest(),
                                  .height = model.height,
                                  .width = model.width,
-                                 .bf16 = bf16},
+                                 .precision = resolve_precision(options_.network.precision)},
                                 available_memory_bytes()));
 
   Passes passes(options_, progress);

@@ -12,13 +12,13 @@ namespace vggtcd {
 namespace {
 
 std::vector<Block> make_attention(const WeightScope& scope, const VggtConfig& config,
-                                  DType compute) {
+                                  ProductTypes types) {
   return make_blocks(scope, config.depth,
                      {.channels = config.channels,
                       .heads = config.heads,
                       .eps = kEps,
                       .qk_norm = true,
-                      .compute = compute});
+                      .types = types});
 }
 
 // Copies x [rows, C] to columns [column, column + C) of kept.
@@ -43,12 +43,12 @@ void show_patches(const Trace& trace, const AggregatedTokens& shape, const Rows&
 
 }  // namespace
 
-Aggregator::Aggregator(const WeightScope& scope, const VggtConfig& config, DType compute)
+Aggregator::Aggregator(const WeightScope& scope, const VggtConfig& config, ProductTypes types)
     : config_(config),
-      compute_(compute),
-      patch_embed_(scope.at("patch_embed"), config, compute),
-      frame_blocks_(make_attention(scope.at("frame_blocks"), config, compute)),
-      global_blocks_(make_attention(scope.at("global_blocks"), config, compute)) {
+      compute_(types.compute),
+      patch_embed_(scope.at("patch_embed"), config, types),
+      frame_blocks_(make_attention(scope.at("frame_blocks"), config, types)),
+      global_blocks_(make_attention(scope.at("global_blocks"), config, types)) {
   const int64_t registers = config.register_tokens, channels = config.channels;
   const auto camera = scope.take_f32("camera_token", {1, 2, 1, channels});
   const auto others = scope.take_f32("register_token", {1, 2, registers, channels});

@@ -30,7 +30,7 @@ struct AggregatedTokens {
 class Aggregator {
  public:
   // scope: aggregator.
-  Aggregator(const WeightScope& scope, const VggtConfig& config, DType compute);
+  Aggregator(const WeightScope& scope, const VggtConfig& config, ProductTypes types);
 
   // after_block is called after each block of the ViT, of frame and of global attention with its
   // stage.

@@ -19,7 +19,7 @@ int64_t hidden_width(const WeightScope& scope) {
 
 LinearOptions scaled_residual(const WeightScope& scope, const char* gamma,
                               const BlockOptions& options) {
-  return {.compute = options.compute, .gamma = scope.take_f32(gamma, {options.channels})};
+  return {.types = options.types, .gamma = scope.take_f32(gamma, {options.channels})};
 }
 
 }  // namespace
@@ -58,13 +58,14 @@ Block::Block(const WeightScope& scope, const BlockOptions& options)
     : options_(options),
       norm1_(scope.at("norm1"), options.channels, options.eps),
       qkv_(scope.at("attn.qkv"), options.channels, 3 * options.channels,
-           {.compute = options.compute, .output = options.compute}),
+           {.types = options.types, .output = options.types.compute}),
       proj_(scope.at("attn.proj"), options.channels, options.channels,
             scaled_residual(scope, "ls1.gamma", options)),
       norm2_(scope.at("norm2"), options.channels, options.eps),
-      fc1_(
-          scope.at("mlp.fc1"), options.channels, hidden_width(scope),
-          {.compute = options.compute, .output = options.compute, .activation = Activation::kGelu}),
+      fc1_(scope.at("mlp.fc1"), options.channels, hidden_width(scope),
+           {.types = options.types,
+            .output = options.types.compute,
+            .activation = Activation::kGelu}),
       fc2_(scope.at("mlp.fc2"), hidden_width(scope), options.channels,
            scaled_residual(scope, "ls2.gamma", options)) {
   if (options.qk_norm) {

@@ -16,9 +16,10 @@ namespace vggtcd {
 struct BlockOptions {
   int64_t channels = 0;
   int64_t heads = 0;
-  float eps = -1;               // of norm1 and norm2
-  bool qk_norm = false;         // LayerNorm of every head's q and k, eps kEps
-  DType compute = DType::kF32;  // of products and attention; residual and norms are f32
+  float eps = -1;        // of norm1 and norm2
+  bool qk_norm = false;  // LayerNorm of every head's q and k, eps kEps
+  // Of the products; attention is computed in types.compute, residual and norms are f32.
+  ProductTypes types = {};
 };
 
 // The grid position of every token of one sequence, for the rotary embedding.

@@ -27,18 +27,16 @@ void run_all(const Linear& linear, int64_t rows, const Rows& x, const Rows& y) {
 
 }  // namespace
 
-CameraHead::CameraHead(const WeightScope& scope, const VggtConfig& config, DType compute)
+CameraHead::CameraHead(const WeightScope& scope, const VggtConfig& config)
     : channels_(2 * config.channels),
       iterations_(config.camera_iterations),
-      compute_(compute),
       empty_pose_(take_empty_pose(scope)),
       token_norm_(scope.at("token_norm"), channels_, kEps),
       trunk_norm_(scope.at("trunk_norm"), channels_, kEps),
       embed_pose_(scope.at("embed_pose"), 9, channels_, {}),
       modulation_(scope.at("poseLN_modulation.1"), channels_, 3 * channels_, {}),
-      trunk_(make_blocks(
-          scope.at("trunk"), config.camera_depth,
-          {.channels = channels_, .heads = config.camera_heads, .eps = kEps, .compute = compute})),
+      trunk_(make_blocks(scope.at("trunk"), config.camera_depth,
+                         {.channels = channels_, .heads = config.camera_heads, .eps = kEps})),
       branch_fc1_(scope.at("pose_branch.fc1"), channels_, channels_ / 2,
                   {.activation = Activation::kGelu}),
       branch_fc2_(scope.at("pose_branch.fc2"), channels_ / 2, 9, {.accumulate = true}) {}
@@ -78,7 +76,7 @@ std::vector<PoseEncoding> CameraHead::forward(const AggregatedTokens& tokens,
   const Rows x(DType::kF32, x_memory, channels_);
   const Rows embedded(DType::kF32, embedded_memory, channels_);
   const Rows hidden(DType::kF32, hidden_memory, channels_ / 2);
-  BlockWorkspace workspace(frames, channels_, trunk_.front().hidden(), compute_);
+  BlockWorkspace workspace(frames, channels_, trunk_.front().hidden(), DType::kF32);
 
   // pose_tokens = token_norm(aggregated_tokens_list[-1][:, :, 0]): row s is s frames further on.
   const Rows camera_tokens(tokens.frame(3, 0).f32(), tokens.tokens() * channels_);

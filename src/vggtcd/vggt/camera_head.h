@@ -16,7 +16,7 @@ using PoseEncoding = std::array<float, 9>;
 class CameraHead {
  public:
   // scope: camera_head.
-  CameraHead(const WeightScope& scope, const VggtConfig& config, DType compute);
+  CameraHead(const WeightScope& scope, const VggtConfig& config);
 
   // One per frame, after the activations: the fields of view are clamped at 0.
   std::vector<PoseEncoding> forward(const AggregatedTokens& tokens, const Trace& trace) const;
@@ -26,7 +26,6 @@ class CameraHead {
 
   int64_t channels_;
   int iterations_;
-  DType compute_;
   PoseEncoding empty_pose_;
   LayerNorm token_norm_, trunk_norm_;
   Linear embed_pose_, modulation_;

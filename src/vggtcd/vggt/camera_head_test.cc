@@ -187,7 +187,7 @@ TEST(CameraHead, MatchesPlainLoopsWhereEpsDecides) {
                              {"camera_head.pose_branch.fc2.bias", -1.0f}});  // negative views
   const WeightStore store(weights.views, "test");
   const VggtConfig config = read_config(store, weights.config);
-  const CameraHead head(store.root().at("camera_head"), config, DType::kF32);
+  const CameraHead head(store.root().at("camera_head"), config);
   AggregatedTokens tokens;
   tokens.frames = 3;
   tokens.grid_height = tokens.grid_width = 1;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -137,6 +138,24 @@ TEST_F(Checkpoint, ConvertedBf16FileStaysWithinWhatRoundingExplains) {
   const Vggt network = Vggt::load(convert(WeightPrecision::kBF16),
                                   {.precision = Precision::kF32, .point_head = true});
   testing::expect_parity(network, "tiny_case_c_s1_70x70.npz", testing::bf16_limit);
+}
+
+TEST_F(Checkpoint, ABf16FileIsTheSameNetworkWhetherItsWeightsAreKeptInBf16OrF32) {
+  if (!bf16_weights_are_supported()) GTEST_SKIP() << "this processor has no AVX2";
+  const fs::path file = convert(WeightPrecision::kBF16);
+  const testing::GoldenCase golden(VGGTCD_SOURCE_DIR "/tests/golden/vggt/tiny_case_c_s1_70x70.npz");
+  const auto run = [&](Precision precision) {
+    return Vggt::load(file, {.precision = precision}).reconstruct(testing::images_of(golden));
+  };
+  const Prediction in_f32 = run(Precision::kF32), in_bf16 = run(Precision::kBf16Weights);
+  // The products are the same ones; on some processors another kernel sums them.
+  double difference = 0, norm = 0;
+  for (size_t i = 0; i < in_f32.reconstruction.depth.size(); ++i) {
+    const double depth = in_f32.reconstruction.depth[i];
+    difference += std::pow(in_bf16.reconstruction.depth[i] - depth, 2);
+    norm += depth * depth;
+  }
+  EXPECT_LE(std::sqrt(difference / norm), testing::f32_limit("depth").rel_l2);
 }
 
 TEST_F(Checkpoint, ValuesTooLargeForHalfPrecisionAreRefused) {

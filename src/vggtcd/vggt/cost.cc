@@ -117,22 +117,25 @@ VggtCost cost_of(const VggtConfig& config, const VggtRun& run) {
 }
 
 VggtMemory memory_of(const VggtConfig& config, const VggtRun& run) {
-  const int64_t c = config.channels, size = run.bf16 ? 2 : 4,
-                heads = run.depth_head + run.point_head;
+  const ProductTypes types = product_types(run.precision);
+  const auto size = static_cast<int64_t>(dtype_size(types.compute));
+  const auto kept_size = static_cast<int64_t>(dtype_size(types.weights));
+  const int64_t c = config.channels, heads = run.depth_head + run.point_head;
   const int64_t rows = run.frames * tokens_of(config, run);
   const int64_t pixels = run.frames * run.height * run.width;
   VggtMemory memory;
   memory.weights =
-      (config.vit_depth + 2 * config.depth) * block_parameters(c, config.mlp_hidden) * size +
+      (config.vit_depth + 2 * config.depth) * block_parameters(c, config.mlp_hidden) * kept_size +
       config.camera_depth * block_parameters(2 * c, config.camera_hidden) * 4 + 28 * c * c +
-      heads * dpt_parameters(config) * size;
+      heads * dpt_parameters(config) * kept_size;
   // Through both phases: the photos and what the heads will read.
   const int64_t kept = rows * 4 * 2 * c * 4, photos = pixels * 3 * 4;
   // The aggregator: residual stream, qkv, the attended rows, packed keys and values.
   const AttentionShape global{1, rows, config.heads, c / config.heads};
-  const int64_t aggregator = rows * c * 4 + rows * 4 * c * size +
-                             num_threads() * kRowBlock * (c + config.mlp_hidden) * size +
-                             static_cast<int64_t>(attention_workspace_bytes(global, run.bf16));
+  const int64_t aggregator =
+      rows * c * 4 + rows * 4 * c * size +
+      num_threads() * kRowBlock * (c + config.mlp_hidden) * size +
+      static_cast<int64_t>(attention_workspace_bytes(global, types.compute == DType::kBF16));
   // The dense heads: results, and the maps of one frame.
   const DptSizes sizes(config, run.height, run.width);
   const int64_t maps = sizes.finest * config.dpt_features * (4 + size) +

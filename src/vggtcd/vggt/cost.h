@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "vggtcd/vggt/config.h"
+#include "vggtcd/vggt/precision.h"
 
 namespace vggtcd {
 
@@ -27,7 +28,7 @@ struct VggtCost {
 
 struct VggtRun {
   int64_t frames = 0, height = 0, width = 0;  // px, multiples of the patch size
-  bool bf16 = false;
+  Precision precision = Precision::kF32;      // resolved
   bool depth_head = true, point_head = false;
 };
 

@@ -32,7 +32,7 @@ int64_t dim(const WeightScope& scope, std::string_view name, size_t index) {
 
 // A transposed convolution whose kernel is its stride is a product per pixel, [in, out, k, k] ->
 // [k * k * out, in]: every input pixel makes its own k x k square.
-Linear make_transposed(const WeightScope& scope, int64_t channels, int64_t k, DType compute) {
+Linear make_transposed(const WeightScope& scope, int64_t channels, int64_t k, ProductTypes types) {
   const auto weight = scope.take_f32("weight", {channels, channels, k, k});
   const auto bias = scope.take_f32("bias", {channels});
   std::vector<float> rows(weight.size()), biases;
@@ -45,16 +45,16 @@ Linear make_transposed(const WeightScope& scope, int64_t channels, int64_t k, DT
       }
     }
   }
-  return {rows, biases, channels, k * k * channels, {.compute = compute, .output = compute}};
+  return {rows, biases, channels, k * k * channels, {.types = types, .output = types.compute}};
 }
 
 // A 1x1 convolution, weight [out, in, 1, 1].
-Linear make_pointwise(const WeightScope& scope, int64_t in, int64_t out, DType compute) {
+Linear make_pointwise(const WeightScope& scope, int64_t in, int64_t out, ProductTypes types) {
   return {scope.take_f32("weight", {out, in, 1, 1}),
           scope.take_f32("bias", {out}),
           in,
           out,
-          {.compute = compute}};
+          {.types = types}};
 }
 
 void copy_as(const Rows& source, const Rows& target, int64_t count, int64_t channels) {
@@ -118,10 +118,10 @@ struct DptHead::Frame {
   }
 };
 
-ResidualUnit::ResidualUnit(const WeightScope& scope, int64_t features, DType compute)
+ResidualUnit::ResidualUnit(const WeightScope& scope, int64_t features, ProductTypes types)
     : conv1_(scope.at("conv1"), features, features, 1,
-             {.compute = compute, .output = compute, .activation = Activation::kRelu}),
-      conv2_(scope.at("conv2"), features, features, 1, {.compute = compute, .accumulate = true}) {}
+             {.types = types, .output = types.compute, .activation = Activation::kRelu}),
+      conv2_(scope.at("conv2"), features, features, 1, {.types = types, .accumulate = true}) {}
 
 void ResidualUnit::add_to(DptMap& x, DptMap& into, DptWorkspace& workspace) const {
   const Rows values = x.rows(), sum = into.rows();
@@ -145,37 +145,37 @@ void ResidualUnit::add_to(DptMap& x, DptMap& into, DptWorkspace& workspace) cons
 DptHead::Fusion DptHead::make_fusion(const WeightScope& scope, int64_t features,
                                      bool coarsest) const {
   std::optional<ResidualUnit> unit1;
-  if (!coarsest) unit1.emplace(scope.at("resConfUnit1"), features, compute_);
-  return {std::move(unit1), ResidualUnit(scope.at("resConfUnit2"), features, compute_),
-          make_pointwise(scope.at("out_conv"), features, features, compute_)};
+  if (!coarsest) unit1.emplace(scope.at("resConfUnit1"), features, types_);
+  return {std::move(unit1), ResidualUnit(scope.at("resConfUnit2"), features, types_),
+          make_pointwise(scope.at("out_conv"), features, features, types_)};
 }
 
-DptHead::DptHead(const WeightScope& scope, const VggtConfig& config, int64_t outputs, DType compute,
-                 std::string name)
+DptHead::DptHead(const WeightScope& scope, const VggtConfig& config, int64_t outputs,
+                 ProductTypes types, std::string name)
     : name_(std::move(name)),
-      compute_(compute),
+      types_(types),
       norm_(scope.at("norm"), 2 * config.channels, kEps),
       output_conv1_(scope.at("scratch.output_conv1"), dim(scope, "scratch.output_conv1.weight", 1),
-                    dim(scope, "scratch.output_conv1.weight", 0), 1, {.compute = compute}),
+                    dim(scope, "scratch.output_conv1.weight", 0), 1, {.types = types}),
       output_conv2_first_(scope.at("scratch.output_conv2.0"), output_conv1_.out(),
                           dim(scope, "scratch.output_conv2.0.weight", 0), 1,
-                          {.compute = compute, .activation = Activation::kRelu}),
+                          {.types = types, .activation = Activation::kRelu}),
       output_conv2_last_(make_pointwise(scope.at("scratch.output_conv2.2"),
-                                        output_conv2_first_.out(), outputs, DType::kF32)) {
+                                        output_conv2_first_.out(), outputs, ProductTypes{})) {
   const int64_t features = dim(scope, "scratch.layer1_rn.weight", 0);
   for (int level = 0; level < 4; ++level) {
     const WeightScope project = scope.at(fmt::format("projects.{}", level));
     const int64_t channels = dim(project, "weight", 0);
-    projects_.push_back(make_pointwise(project, 2 * config.channels, channels, compute));
+    projects_.push_back(make_pointwise(project, 2 * config.channels, channels, types));
     const WeightScope resize = scope.at(fmt::format("resize_layers.{}", level));
     if (level < 2) {
-      resize_layers_.push_back(make_transposed(resize, channels, level == 0 ? 4 : 2, compute));
+      resize_layers_.push_back(make_transposed(resize, channels, level == 0 ? 4 : 2, types));
     } else if (level == 3) {
       downsample_.emplace(resize, channels, channels, 2,
-                          LinearOptions{.compute = compute, .output = compute});
+                          LinearOptions{.types = types, .output = types.compute});
     }
     layer_rn_.emplace_back(scope.at(fmt::format("scratch.layer{}_rn", level + 1)), channels,
-                           features, 1, LinearOptions{.compute = compute}, false);
+                           features, 1, LinearOptions{.types = types}, false);
     fusions_.push_back(
         make_fusion(scope.at(fmt::format("scratch.refinenet{}", level + 1)), features, level == 3));
   }
@@ -187,11 +187,11 @@ void DptHead::project(const Frame& frame, size_t level, DptMap& target) const {
   const Linear& linear = projects_[level];
   const DptPositions positions(tokens.grid_height, tokens.grid_width, linear.out(), frame.height,
                                frame.width);
-  target.resize(compute_, tokens.grid_height, tokens.grid_width, linear.out());
+  target.resize(types_.compute, tokens.grid_height, tokens.grid_width, linear.out());
   const Rows patches = tokens.frame(level, frame.index).at(tokens.special), out = target.rows();
   parallel_for(target.pixels(), kRowBlock, [&](int64_t begin, int64_t end) {
     const int64_t count = end - begin;
-    const Rows normal = thread_rows<0>(compute_, tokens.channels);
+    const Rows normal = thread_rows<0>(types_.compute, tokens.channels);
     const Rows projected = thread_rows<1>(DType::kF32, linear.out());
     norm_.run(count, patches.at(begin), normal);
     linear.run(count, normal, projected);  // [count, 2C] -> [count, channels of this level]
@@ -205,11 +205,11 @@ void DptHead::project(const Frame& frame, size_t level, DptMap& target) const {
 void DptHead::upsample(const Frame&, const Linear& linear, int64_t factor, const DptMap& source,
                        DptMap& target) const {
   const int64_t channels = source.channels;
-  target.resize(compute_, source.height * factor, source.width * factor, channels);
+  target.resize(types_.compute, source.height * factor, source.width * factor, channels);
   const Rows in = source.rows(), out = target.rows();
-  const size_t run_bytes = bytes_of(compute_, factor, channels);
+  const size_t run_bytes = bytes_of(types_.compute, factor, channels);
   parallel_for(source.pixels(), kRowBlock, [&](int64_t begin, int64_t end) {
-    const Rows squares = thread_rows<2>(compute_, factor * factor * channels);
+    const Rows squares = thread_rows<2>(types_.compute, factor * factor * channels);
     linear.run(end - begin, in.at(begin), squares);  // [count, c] -> [count, k * k * c]
     for (int64_t pixel = begin; pixel < end; ++pixel) {
       const int64_t y = pixel / source.width * factor, x = pixel % source.width * factor;
@@ -231,8 +231,8 @@ void DptHead::reassemble(const Frame& frame, size_t level) const {
     resized = &maps.stage;
   } else if (level == 3) {
     const DptMap& x = maps.projected;
-    maps.stage.resize(compute_, downsample_->out_size(x.height), downsample_->out_size(x.width),
-                      x.channels);
+    maps.stage.resize(types_.compute, downsample_->out_size(x.height),
+                      downsample_->out_size(x.width), x.channels);
     downsample_->run(x.height, x.width, x.rows(), maps.stage.rows());
     resized = &maps.stage;
   }
@@ -254,7 +254,7 @@ void DptHead::fuse(const Frame& frame, size_t level) const {
   if (fusion.unit1) fusion.unit1->add_to(layer, path, maps);
   fusion.unit2.add_to(path, path, maps);
 
-  const Rows input = as_input(path, compute_, maps);
+  const Rows input = as_input(path, types_.compute, maps);
   maps.narrow.resize(DType::kF32, path.height, path.width, path.channels);
   const Rows narrow = maps.narrow.rows();
   parallel_for(path.pixels(), kRowBlock, [&](int64_t begin, int64_t end) {
@@ -273,7 +273,8 @@ void DptHead::output(const Frame& frame, float* out) const {
   DptWorkspace& maps = frame.maps;
   DptMap& path = maps.path;
   maps.narrow.resize(DType::kF32, path.height, path.width, output_conv1_.out());
-  output_conv1_.run(path.height, path.width, as_input(path, compute_, maps), maps.narrow.rows());
+  output_conv1_.run(path.height, path.width, as_input(path, types_.compute, maps),
+                    maps.narrow.rows());
   frame.show("output_conv1", maps.narrow);
 
   resize_to(maps.narrow, frame.height, frame.width, maps.wide);
@@ -285,7 +286,7 @@ void DptHead::output(const Frame& frame, float* out) const {
   });
 
   DptMap& hidden = maps.narrow;
-  const Rows input = as_input(maps.wide, compute_, maps);
+  const Rows input = as_input(maps.wide, types_.compute, maps);
   hidden.resize(DType::kF32, frame.height, frame.width, output_conv2_first_.out());
   output_conv2_first_.run(frame.height, frame.width, input, hidden.rows());
   const Rows result(out, outputs());

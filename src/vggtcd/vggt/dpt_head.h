@@ -36,7 +36,7 @@ struct DptWorkspace {
 // sum has relu(x).
 class ResidualUnit {
  public:
-  ResidualUnit(const WeightScope& scope, int64_t features, DType compute);
+  ResidualUnit(const WeightScope& scope, int64_t features, ProductTypes types);
   // into += relu(x) + conv2(relu(conv1(relu(x)))); into == x: x = that. Overwrites x.
   void add_to(DptMap& x, DptMap& into, DptWorkspace& workspace) const;
 
@@ -47,7 +47,7 @@ class ResidualUnit {
 class DptHead {
  public:
   // scope: depth_head or point_head; outputs: channels of the result; name: of traced tensors.
-  DptHead(const WeightScope& scope, const VggtConfig& config, int64_t outputs, DType compute,
+  DptHead(const WeightScope& scope, const VggtConfig& config, int64_t outputs, ProductTypes types,
           std::string name);
 
   // out [height, width, outputs]: the raw result of one frame, before its activations. height and
@@ -74,7 +74,7 @@ class DptHead {
   void output(const Frame& frame, float* out) const;
 
   std::string name_;
-  DType compute_;
+  ProductTypes types_;
   LayerNorm norm_;
   std::vector<Linear> projects_;       // 1x1 convolutions, one per level
   std::vector<Linear> resize_layers_;  // transposed 4x4 of stride 4, transposed 2x2 of stride 2

@@ -22,9 +22,9 @@ double gigabytes(int64_t bytes) { return static_cast<double>(bytes) / 1e9; }
 }  // namespace
 
 std::string MemoryPlan::summary() const {
-  return fmt::format("{} {} of {} x {} px in {}: about {:.1f} GB of memory", run.frames,
+  return fmt::format("{} {} of {} x {} px, precision {}: about {:.1f} GB of memory", run.frames,
                      run.frames == 1 ? "frame" : "frames", run.width, run.height,
-                     run.bf16 ? "bf16" : "f32", gigabytes(needed));
+                     enum_to_string(run.precision), gigabytes(needed));
 }
 
 MemoryPlan plan_memory(const VggtConfig& config, const VggtRun& run, int64_t available) {
@@ -46,7 +46,9 @@ void throw_unless_fits(const MemoryPlan& plan) {
                                  : "not even one frame fits";
   throw_error(ErrorCode::kMemory, "{}, but {:.1f} GB are free; {}{}", plan.summary(),
               gigabytes(plan.available), remedy,
-              plan.run.bf16 ? "" : "; --precision bf16 halves the weights where it is available");
+              plan.run.precision == Precision::kF32 && bf16_weights_are_supported()
+                  ? "; --precision bf16_weights halves the weights"
+                  : "");
 }
 
 }  // namespace vggtcd

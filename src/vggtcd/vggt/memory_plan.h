@@ -14,7 +14,8 @@ struct MemoryPlan {
   int64_t frames_that_fit = 0;        // of this size and precision
 
   bool fits() const { return needed <= available; }
-  std::string summary() const;  // "84 frames of 518 x 392 px in bf16: about 9.1 GB of memory"
+  std::string summary()
+      const;  // "84 frames of 518 x 392 px, precision bf16: about 9.1 GB of memory"
 };
 
 // available: bytes that the pass may use (core/timer.h, available_memory_bytes).

@@ -25,7 +25,7 @@ TEST(MemoryPlan, NeedGrowsWithFramesSizeAndPrecision) {
   VggtRun more = run, larger = run, half = run;
   more.frames = 8;
   larger.height = 280;
-  half.bf16 = true;
+  half.precision = Precision::kBf16Weights;
   EXPECT_GT(need(more), need(run));
   EXPECT_GT(need(larger), need(run));
   EXPECT_LT(need(half), need(run));

@@ -12,13 +12,6 @@
 namespace vggtcd {
 namespace {
 
-DType aggregator_type(Precision precision) {
-  return precision == Precision::kBf16 ? DType::kBF16 : DType::kF32;
-}
-
-// The camera head is small work on many weights: f32 costs nothing and keeps the poses exact.
-constexpr DType kCameraType = DType::kF32;
-
 // Heads that this library does not have.
 constexpr std::array<std::string_view, 1> kForeignModules = {"track_head."};
 
@@ -84,31 +77,13 @@ void split_points(const std::vector<float>& raw, float* points, float* confidenc
 
 }  // namespace
 
-std::span<const EnumName<Precision>> enum_names(Precision) {
-  static constexpr std::array<EnumName<Precision>, 3> names = {{
-      {Precision::kAuto, "auto"},
-      {Precision::kF32, "f32"},
-      {Precision::kBf16, "bf16"},
-  }};
-  return names;
-}
-
-Precision resolve_precision(Precision asked) {
-  if (asked == Precision::kAuto) return bf16_is_fast() ? Precision::kBf16 : Precision::kF32;
-  if (asked == Precision::kBf16 && !bf16_is_fast()) {
-    throw_error(ErrorCode::kUsage,
-                "precision: bf16 needs a processor with AVX512_BF16, found none; use f32");
-  }
-  return asked;
-}
-
 Vggt::Vggt(const WeightStore& store, const std::string& config_json, const VggtOptions& options)
     : config_(read_config(store, config_json)),
       precision_(resolve_precision(options.precision)),
-      aggregator_(store.root().at("aggregator"), config_, aggregator_type(precision_)),
-      camera_head_(store.root().at("camera_head"), config_, kCameraType) {
+      aggregator_(store.root().at("aggregator"), config_, product_types(precision_)),
+      camera_head_(store.root().at("camera_head"), config_) {
   std::vector<std::string_view> ignored(kForeignModules.begin(), kForeignModules.end());
-  const DType dense = aggregator_type(precision_);
+  const ProductTypes dense = product_types(precision_);
   if (options.depth_head) {
     depth_head_.emplace(store.root().at("depth_head"), config_, 2, dense, "depth_head");
   } else {
@@ -155,9 +130,8 @@ void Vggt::check_images(const ImageBatch& images) const {
 }
 
 VggtRun Vggt::run_of(const ImageBatch& images) const {
-  return {
-      images.frames,           images.height,          images.width, precision_ == Precision::kBf16,
-      depth_head_.has_value(), point_head_.has_value()};
+  return {images.frames, images.height,           images.width,
+          precision_,    depth_head_.has_value(), point_head_.has_value()};
 }
 
 void Vggt::run_dense_heads(const ImageBatch& images, const AggregatedTokens& tokens,

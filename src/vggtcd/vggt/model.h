@@ -8,7 +8,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -18,18 +17,9 @@
 #include "vggtcd/vggt/camera_head.h"
 #include "vggtcd/vggt/cost.h"
 #include "vggtcd/vggt/dpt_head.h"
+#include "vggtcd/vggt/precision.h"
 
 namespace vggtcd {
-
-enum class Precision {
-  kAuto,  // kBf16 where the processor multiplies bf16 (AVX512_BF16), else kF32
-  kF32,   // equal to the reference network to f32 rounding
-  kBf16   // products and attention on bf16, sums, norms and the residual stream in f32
-};
-std::span<const EnumName<Precision>> enum_names(Precision);
-
-// What is computed with: kF32 or kBf16. Error{kUsage} for kBf16 on a processor that has none.
-Precision resolve_precision(Precision asked);
 
 struct VggtOptions {
   Precision precision = Precision::kAuto;
@@ -37,7 +27,7 @@ struct VggtOptions {
   bool point_head = false;  // world points and their confidence
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
-    field("precision", self.precision, "auto, f32 or bf16");
+    field("precision", self.precision, kPrecisionHelp);
     field("depth_head", self.depth_head, "run the depth head");
     field("point_head", self.point_head, "run the point head too");
   };
@@ -60,8 +50,8 @@ class Vggt {
 
   // Builds the network; all weights are copied, so the tensors may go away afterwards. source names
   // their file in errors; config_json: see read_config; release: see WeightStore. Throws
-  // Error{kWeights} if a tensor that the options need is missing or misshapen, Error{kUsage} for
-  // bf16 on a processor that has none.
+  // Error{kWeights} if a tensor that the options need is missing or misshapen, Error{kUsage} for a
+  // precision that this processor does not have.
   static Vggt from_tensors(std::vector<TensorView> tensors, const std::string& config_json,
                            const std::string& source, const VggtOptions& options,
                            ReleaseWeights release = {});

@@ -44,6 +44,11 @@ TEST(VggtTiny, EveryStageEqualsTheReferenceInF32) {
   expect_all_cases(model, testing::f32_limit);
 }
 
+TEST(VggtTiny, Bf16WeightsStayWithinWhatRoundingExplains) {
+  if (!bf16_weights_are_supported()) GTEST_SKIP() << "this processor has no AVX2";
+  expect_all_cases(tiny(Precision::kBf16Weights), testing::bf16_limit);
+}
+
 TEST(VggtTiny, Bf16StaysWithinWhatRoundingExplains) {
   if (!bf16_is_fast()) GTEST_SKIP() << "this processor has no AVX512_BF16";
   expect_all_cases(tiny(Precision::kBf16), testing::bf16_limit);
@@ -74,6 +79,9 @@ TEST_P(VggtPrecision, BitsDoNotDependOnTheNumberOfThreads) {
   if (GetParam() == Precision::kBf16 && !bf16_is_fast()) {
     GTEST_SKIP() << "this processor has no AVX512_BF16";
   }
+  if (GetParam() == Precision::kBf16Weights && !bf16_weights_are_supported()) {
+    GTEST_SKIP() << "this processor has no AVX2";
+  }
   const ImageBatch images = small_images(4);
   const int before = num_threads();
   std::vector<Prediction> predictions;
@@ -90,7 +98,9 @@ TEST_P(VggtPrecision, BitsDoNotDependOnTheNumberOfThreads) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Both, VggtPrecision, ::testing::Values(Precision::kF32, Precision::kBf16),
+INSTANTIATE_TEST_SUITE_P(All, VggtPrecision,
+                         ::testing::Values(Precision::kF32, Precision::kBf16Weights,
+                                           Precision::kBf16),
                          [](const auto& test) { return std::string(enum_to_string(test.param)); });
 
 TEST(Vggt, HeadsThatNobodyAskedForAreNeitherNeededNorRun) {
@@ -174,8 +184,16 @@ TEST(Vggt, RefusesImagesThatAreNotWholePatches) {
 
 TEST(Vggt, Bf16IsRefusedWhereTheProcessorHasNone) {
   const ScopedCpuLevel level(std::min(CpuLevel::kAvx2, detected_cpu_level()));
-  EXPECT_THAT(error_of([] { tiny(Precision::kBf16); }, ErrorCode::kUsage), HasSubstr("use f32"));
-  EXPECT_EQ(tiny(Precision::kAuto).precision(), Precision::kF32);
+  EXPECT_THAT(error_of([] { tiny(Precision::kBf16); }, ErrorCode::kUsage), HasSubstr("use auto"));
+  EXPECT_EQ(tiny(Precision::kAuto).precision(),
+            bf16_weights_are_supported() ? Precision::kBf16Weights : Precision::kF32);
+}
+
+TEST(Vggt, Bf16WeightsAreRefusedWithoutAvx2) {
+  const ScopedCpuLevel level(CpuLevel::kReference);
+  EXPECT_THAT(error_of([] { tiny(Precision::kBf16Weights); }, ErrorCode::kUsage),
+              HasSubstr("use f32"));
+  EXPECT_EQ(resolve_precision(Precision::kAuto), Precision::kF32);
 }
 
 TEST(Vggt, WeightsThatAreNotFiniteAreReportedNotReturned) {
@@ -207,7 +225,7 @@ TEST(VggtCost, TenViewsOfTheFullNetworkCountAsTheReferenceDoes) {
   config.dpt_features = 256;
   config.dpt_channels = {256, 512, 1024, 1024};
   config.dpt_output_channels = {128, 32};
-  const VggtCost cost = cost_of(config, {10, 392, 518, true, true, false});
+  const VggtCost cost = cost_of(config, {.frames = 10, .height = 392, .width = 518});
   EXPECT_NEAR(cost.total_flop() * 1e-12, 33.9, 0.15);
   EXPECT_NEAR(cost.attention_flop * 1e-12, 12.8, 0.05);
 }

@@ -33,7 +33,7 @@ void gather_patch(const ImageBatch& images, int64_t frame, int64_t y, int64_t x,
 
 }  // namespace
 
-PatchEmbed::PatchEmbed(const WeightScope& scope, const VggtConfig& config, DType compute)
+PatchEmbed::PatchEmbed(const WeightScope& scope, const VggtConfig& config, ProductTypes types)
     : channels_(config.channels),
       patch_(config.patch_size),
       grid_(config.position_grid),
@@ -43,7 +43,7 @@ PatchEmbed::PatchEmbed(const WeightScope& scope, const VggtConfig& config, DType
                           {.channels = config.channels,
                            .heads = config.vit_heads,
                            .eps = kVitEps,
-                           .compute = compute})),
+                           .types = types})),
       norm_(scope.at("norm"), config.channels, kVitEps) {
   positions_ = scope.take_f32("pos_embed", {1, 1 + grid_ * grid_, channels_});
   special_tokens_ = scope.take_f32("cls_token", {1, 1, channels_});

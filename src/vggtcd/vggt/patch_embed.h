@@ -16,7 +16,7 @@ namespace vggtcd {
 class PatchEmbed {
  public:
   // scope: aggregator.patch_embed.
-  PatchEmbed(const WeightScope& scope, const VggtConfig& config, DType compute);
+  PatchEmbed(const WeightScope& scope, const VggtConfig& config, ProductTypes types);
 
   // Writes the patch tokens of frame s to rows s * rows_per_frame + first_row + p of out (f32).
   // after_block is called after each block.
