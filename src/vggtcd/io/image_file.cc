@@ -133,10 +133,13 @@ class Decoder {
     if (header_ && header_->pixels() > kMaxPixels) too_large("save it smaller, or as JPEG");
     if (is_rgba_png(file_) || !file_.starts_with(kPngStart)) {
       const cv::Mat picture = take(vggtcd::decode(file_, cv::IMREAD_UNCHANGED), false);
-      const bool rgba =
-          picture.channels() == 4 && (picture.depth() == CV_8U || picture.depth() == CV_16U);
+      // What could not be decoded has a type, too.
+      const bool rgba = !picture.empty() && picture.channels() == 4 &&
+                        (picture.depth() == CV_8U || picture.depth() == CV_16U);
       if (rgba) return rgb_on_white(picture);
-      if (picture.type() == CV_16UC3) return rgb_from_bgr(high_bytes(picture));
+      if (!picture.empty() && picture.type() == CV_16UC3) {
+        return rgb_from_bgr(high_bytes(picture));
+      }
     }
     return decode_color(file_, cv::IMREAD_COLOR);
   }

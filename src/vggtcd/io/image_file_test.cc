@@ -290,6 +290,21 @@ TEST(ImageFile, WhatADecoderComplainsAboutIsARemarkAndNothingIsPrinted) {
   EXPECT_EQ(outcome.image.rgb, decoded(whole).image.rgb);
 }
 
+TEST(ImageFile, DamagedDataOfAnyFormatAreRefusedOrGiveAPictureOfTheWholeSize) {
+  for (const char* extension : {".png", ".tiff", ".webp", ".jp2"}) {
+    for (const int type : {CV_8UC3, CV_8UC4, CV_16UC3}) {
+      if (std::string(extension) == ".webp" && type == CV_16UC3) continue;
+      std::string file = encoded(extension, noise(48, 40, type));
+      for (size_t i = 0; i < 20; ++i) file[file.size() / 2 + i] ^= '\x2a';
+      try {
+        EXPECT_EQ(decoded(file).image.rgb.size(), 3u * 48 * 40) << extension << type;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::kInput) << error.what();
+      }
+    }
+  }
+}
+
 // A sound JPEG of one grey: each block of 8 x 8 px takes two bits.
 std::string gray_jpeg(int width, int height, char frame_marker) {
   const auto segment = [](char marker, const std::string& data) {
