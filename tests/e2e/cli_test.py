@@ -8,6 +8,7 @@ import csv
 import json
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
@@ -21,7 +22,8 @@ EXAMPLE = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
 def run(*arguments, **kwargs):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, **kwargs)
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300,
+                          errors="surrogateescape", **kwargs)
 
 
 def read_ply(path):
@@ -530,6 +532,44 @@ class Explain(unittest.TestCase):
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn(word, done.stderr)
             self.assertFalse((self.root / "bad").exists())
+
+
+class UnusualNames(unittest.TestCase):
+    """Names of photos are kept to the byte for use and escaped for display."""
+
+    NAMES = ["a\n.jpg", "a\n.png", "caf\udce9.jpg"]  # a byte that is not UTF-8 as os.fsdecode has it
+
+    def setUp(self):
+        self.temporary = tempfile.TemporaryDirectory()
+        self.root = pathlib.Path(self.temporary.name)
+        arrays = np.load(EXAMPLE / "t1.npz")
+        for name in ("t1", "t2"):
+            np.savez(self.root / f"{name}.npz", names=np.array(self.NAMES),
+                     **{key: arrays[key][:3] for key in ("extrinsic", "intrinsic", "depth", "images")})
+        self.arguments = ["detect", self.root / "t1.npz", self.root / "t2.npz", "--aligned", "--accept-alignment"]
+
+    def tearDown(self):
+        self.temporary.cleanup()
+
+    def test_name_results_and_find_them(self):
+        out = self.root / "out"
+        for name in self.NAMES:
+            done = run(*self.arguments, "-o", out, "--explain", "50,50,before/" + name)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertNotIn("a\n.", done.stdout + done.stderr)
+            self.assertNotIn("\udce9", done.stdout + done.stderr)
+            self.assertIn("caf\\xe9.jpg", done.stdout)
+        for epoch in ("before", "after"):
+            self.assertEqual(sorted(os.listdir(os.fsencode(out / "overlays" / epoch))),
+                             [b"a\\x0a.jpg.png", b"a\\x0a.png.png", b"caf\xe9.jpg.png"])
+        images = (out / "colmap" / "images.txt").read_bytes()
+        self.assertIn(b" before/a\\x0a.jpg\n", images)
+        self.assertIn(b" after/caf\xe9.jpg\n", images)
+        shutil.rmtree(out / "overlays" / "after")
+        page = (out / "report.html").stat().st_size
+        done = run("view", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertLess((out / "report.html").stat().st_size, page)  # it found the overlays under these names
 
 
 class Help(unittest.TestCase):

@@ -5,6 +5,7 @@
 Usage: photos_test.py PROGRAM TEST_MEDIA [unittest arguments]
 """
 import fcntl
+import json
 import os
 import pathlib
 import re
@@ -24,6 +25,11 @@ def run(*arguments, **kwargs):
     environment = {**os.environ, "VGGTCD_WEIGHTS": "", "HOME": "/nonexistent", **kwargs.pop("env", {})}
     return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=500,
                           env=environment, **kwargs)
+
+
+def run_bytes(*arguments):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, timeout=500,
+                          env={**os.environ, "VGGTCD_WEIGHTS": "", "HOME": "/nonexistent"})
 
 
 def write_photo(path, seed, width=96, height=64):
@@ -232,6 +238,39 @@ class BadInput(unittest.TestCase):
         self.assertIn("3.ppm: not a readable photo", self.refusal("--dry-run", status=3))
         self.assertFalse((self.root / "out").exists())
 
+    def test_a_line_is_one_line_and_acts_on_no_terminal_whatever_names_hold(self):
+        names = (b"y\nvggt-cd: all is well.ppm", b"x\033]0;title\007\033[2J.ppm", b"caf\351.ppm", "é.ppm".encode())
+        photo = (self.root / "after" / "3.ppm").read_bytes()
+        for name in names:
+            path = os.path.join(os.fsencode(self.root / "after"), name)
+            for content in (photo, photo[:200]):  # the same as another one, then cut off
+                with open(path, "wb") as file:
+                    file.write(content)
+                done = run_bytes("detect", self.root / "before", self.root / "after", "-o", self.root / "out", "--dry-run")
+                self.assertEqual(done.returncode, 0 if content == photo else 3, done.stderr)
+                self.assertEqual(re.findall(rb"[\x00-\x09\x0b-\x1f\x7f]", done.stdout + done.stderr), [])
+                for line in done.stderr.decode().splitlines():  # raises where a byte is not UTF-8
+                    self.assertRegex(line, "^(vggt-cd|note|read photos): ")
+                    self.assertNotRegex(line, "^vggt-cd: all")
+            os.remove(path)
+
+    def test_what_decoders_say_is_told_by_the_program_once_for_each_photo(self):
+        subprocess.run([PROGRAM, "synthesize", self.root / "scene", "--frames", "4", "--width", "112", "--no-wat"],
+                       check=True, capture_output=True)
+        jpeg = (self.root / "scene" / "before" / "0001.jpg").read_bytes()
+        (self.root / "scene" / "before" / "0001.jpg").write_bytes(jpeg[:len(jpeg) // 2] + b"\xff\xd9")
+        for arguments in (("--progress", "json"), ("--progress", "plain")):
+            done = run("detect", self.root / "scene/before", self.root / "scene/after", "-o", self.root / "out",
+                       "--dry-run", *arguments)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            lines = done.stderr.splitlines()
+            if "json" in arguments:
+                lines = [json.loads(line).get("message", "") for line in lines]
+            about = [line for line in lines if "0001.jpg" in line]
+            self.assertEqual(len(about), 1, done.stderr)
+            self.assertRegex(about[0], "before/0001.jpg: part of the picture is damaged or missing")
+            self.assertNotIn("Corrupt", done.stderr)
+
     def test_odd_sizes(self):
         self.assertIn("multiple of 14", self.refusal("--frame-side", "150", status=2))
 
@@ -276,6 +315,28 @@ class DryRun(unittest.TestCase):
         self.assertIn("3 frames before, 5 after", text)
         self.assertIn("96 x 64 px before, 96 x 64 px after", text)
         self.assertRegex(text, r"Memory: about \d+\.\d GB")
+
+    def test_masks_and_second_formats_are_not_counted(self):
+        for i in range(4):
+            write_photo(self.root / "before" / f"{i}.ppm", i + 1)
+            write_photo(self.root / "before" / f"{i}_mask.ppm", i + 31)
+            write_photo(self.root / "after" / f"{i}.ppm", i + 11)
+            ppm = (self.root / "after" / f"{i}.ppm").read_bytes()
+            (self.root / "after" / f"{i}.pgm").write_bytes(b"P6 96 64 255 " + ppm[-96 * 64 * 3:])  # told by content
+        text, _ = self.plan(self.root / "before", self.root / "after")
+        self.assertIn("4 before, 4 after", text)
+
+    def test_memory_counts_what_decoding_takes(self):
+        def planned(width, height):
+            for epoch in ("before", "after"):
+                for i in range(4):
+                    write_photo(self.root / epoch / f"{i}.ppm", i + 1 + 10 * (epoch == "after"))
+            (self.root / "before" / "large.ppm").write_bytes(
+                b"P6 %d %d 255\n" % (width, height) + bytes(width * height * 3))
+            text, _ = self.plan(self.root / "before", self.root / "after", "--frame-side", "98", "--threads", "1")
+            return float(re.search(r"Memory: about (\d+\.\d) GB", text)[1])
+        self.assertLess(planned(96, 64), 0.5)
+        self.assertGreater(planned(6000, 5000), 0.6)  # 11 bytes a pixel and what is there anyway
 
     def test_a_video_beside_a_folder(self):
         for i in range(12):

@@ -8,6 +8,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/photo_stages.h"
 
 namespace vggtcd::cli {
@@ -15,6 +16,12 @@ namespace {
 
 double percent(int64_t part, int64_t whole) {
   return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+PixelExplanation with_escaped_names(PixelExplanation why) {
+  why.photo = escaped(why.photo);
+  for (PhotoTestimony& photo : why.photos) photo.photo = escaped(photo.photo);
+  return why;
 }
 
 }  // namespace
@@ -43,7 +50,7 @@ void add_detect(Program& program) {
         return;
       }
       photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);
-      fmt::print("{}\n", photos.explanation);
+      fmt::print("{}\n", escaped(photos.explanation));
       inputs = photos.inputs;
       inputs.metric = metric;
     } else {
@@ -55,7 +62,7 @@ void add_detect(Program& program) {
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
     print_plausibility(outcome.alignment);
-    fmt::print("{}\n", outcome.alignment.explanation);
+    fmt::print("{}\n", escaped(outcome.alignment.explanation));
     fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
                percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
                percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
@@ -67,17 +74,17 @@ void add_detect(Program& program) {
     fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
                outcome.moved);
     if (outcome.explanation) {
-      fmt::print("{}\n{}",
-                 explanation_sentence(*outcome.explanation, outcome.metric ? "m" : "scene units"),
-                 explanation_table(*outcome.explanation));
+      const PixelExplanation why = with_escaped_names(*outcome.explanation);
+      fmt::print("{}\n{}", explanation_sentence(why, outcome.metric ? "m" : "scene units"),
+                 explanation_table(why));
     }
-    fmt::print("{}\n", outcome.metric ? metric_sentence(*outcome.metric)
+    fmt::print("{}\n", outcome.metric ? escaped(metric_sentence(*outcome.metric))
                                       : "Lengths are in scene units; --known-distance or "
                                         "--reference gives metres.");
+    const std::string out = escaped(epochs.out);
     fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
-               arguments->options.page ? epochs.out + "/report.html, " : "",
-               arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
-               epochs.out);
+               arguments->options.page ? out + "/report.html, " : "",
+               arguments->options.overlays ? out + "/overlays, " : "", out, out);
   };
   CLI::App* command =
       add_command(program, program.app, "detect",

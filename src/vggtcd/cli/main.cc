@@ -13,12 +13,13 @@
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/version.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd::cli {
 namespace {
 
 int fail(ErrorCode code, std::string_view what) {
-  fmt::print(stderr, "vggt-cd: {}\n", what);
+  fmt::print(stderr, "vggt-cd: {}\n", escaped(what));  // one line, whatever a name holds
   return static_cast<int>(code);
 }
 

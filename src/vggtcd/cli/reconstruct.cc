@@ -8,6 +8,7 @@
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/photo_source.h"
+#include "vggtcd/io/quote.h"
 #include "vggtcd/reconstruction/choose_reconstructor.h"
 #include "vggtcd/vggt/batch_file.h"
 #include "vggtcd/vggt/checkpoint.h"
@@ -65,7 +66,7 @@ void reconstruct(const Arguments& arguments, ProgressSink& progress) {
     const ProgressStage stage(progress, "write");
     write_prediction(arguments.output, images, prediction);
   }
-  fmt::print("{}: {} frames of {} x {} px\n", arguments.output.string(), images.frames,
+  fmt::print("{}: {} frames of {} x {} px\n", escaped(arguments.output.string()), images.frames,
              images.width, images.height);
 }
 

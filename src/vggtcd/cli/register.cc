@@ -34,9 +34,10 @@ void add_register(Program& program) {
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);
         print_plausibility(alignment);
-        fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n", alignment.explanation,
-                   arguments->epochs.out, alignment.t2_from_t1.scale);
-        if (metric) fmt::print("{}\n", metric_sentence(*metric));
+        fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n",
+                   escaped(alignment.explanation), escaped(arguments->epochs.out),
+                   alignment.t2_from_t1.scale);
+        if (metric) fmt::print("{}\n", escaped(metric_sentence(*metric)));
       });
   arguments->epochs.add_to(command);
   add_fields(command, arguments->options, "Alignment");

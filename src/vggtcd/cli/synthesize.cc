@@ -4,6 +4,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -26,7 +27,7 @@ void run(const Arguments& arguments, ProgressSink& progress) {
   fmt::print(
       "{}: before/ after/ (photos), t1.npz t2.npz joint.npz (predictions), truth.npz "
       "truth.json\n",
-      arguments.directory);
+      escaped(arguments.directory));
 }
 
 }  // namespace

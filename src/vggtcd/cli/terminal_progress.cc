@@ -14,6 +14,7 @@
 
 #include "vggtcd/core/job_clock.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -36,7 +37,9 @@ class NoticesOnly : public ProgressSink {
   void stage_started(std::string_view) override {}
   void stage_advanced(std::string_view, double) override {}
   void stage_finished(std::string_view, double) override {}
-  void notice(std::string_view message) override { fmt::print(stderr, "note: {}\n", message); }
+  void notice(std::string_view message) override {
+    fmt::print(stderr, "note: {}\n", escaped(message));
+  }
 };
 
 // What the displays share: the clock of stage and job.
@@ -82,7 +85,9 @@ class TimedProgress : public ProgressSink {
 
 class PlainLines : public TimedProgress {
  public:
-  void notice(std::string_view message) override { fmt::print(stderr, "note: {}\n", message); }
+  void notice(std::string_view message) override {
+    fmt::print(stderr, "note: {}\n", escaped(message));
+  }
 
  protected:
   void show_started(std::string_view) override { shown_s_ = monotonic_seconds(); }
@@ -109,7 +114,7 @@ class LiveLine : public TimedProgress {
   ~LiveLine() override { erase(); }
   void notice(std::string_view message) override {
     erase();
-    fmt::print(stderr, "note: {}\n", message);
+    fmt::print(stderr, "note: {}\n", escaped(message));
   }
 
  protected:
@@ -162,7 +167,7 @@ class JsonLines : public TimedProgress {
     write({{"event", "job_planned"}, {"stages", std::move(list)}});
   }
   void notice(std::string_view message) override {
-    write({{"event", "notice"}, {"message", message}});
+    write({{"event", "notice"}, {"message", escaped(message)}});
   }
 
  protected:

@@ -83,7 +83,7 @@ void add_info(Program& program, CLI::App& parent) {
   CLI::App* command = add_command(
       program, parent, "info", "Show what a weights file holds.", [path](ProgressSink&) {
         const WeightFile file = open_weight_file(*path);
-        fmt::print("{:<13}{}\n", "file", *path);
+        fmt::print("{:<13}{}\n", "file", escaped(*path));
         fmt::print("{:<13}{}\n", "format", weight_format_name(file.format));
         print_precision(file);
         const CheckpointReport report = inspect_checkpoint(file, *path);
@@ -108,7 +108,7 @@ void add_convert(Program& program, CLI::App& parent) {
       program, parent, "convert", "Write a weights file as safetensors of another precision.",
       [arguments](ProgressSink& progress) {
         convert_weights(arguments->from, arguments->to, arguments->options, progress);
-        fmt::print("{}\n", arguments->to);
+        fmt::print("{}\n", escaped(arguments->to));
       });
   command->add_option("FILE", arguments->from, "A .safetensors or .pt file.")->required();
   command->add_option("-o,--out,--output", arguments->to, "The .safetensors file to write.")

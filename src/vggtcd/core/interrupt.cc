@@ -11,7 +11,10 @@ namespace vggtcd {
 namespace {
 
 std::atomic<bool> g_interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "used in a signal handler");
+std::atomic<const char*> g_input_lost{nullptr};
+static_assert(std::atomic<bool>::is_always_lock_free &&
+                  std::atomic<const char*>::is_always_lock_free,
+              "used in signal handlers");
 
 void on_signal(int signal) {
   request_interrupt();
@@ -21,11 +24,22 @@ void on_signal(int signal) {
 }  // namespace
 
 void request_interrupt() noexcept { g_interrupted.store(true, std::memory_order_relaxed); }
-void clear_interrupt() noexcept { g_interrupted.store(false, std::memory_order_relaxed); }
-bool interrupt_requested() noexcept { return g_interrupted.load(std::memory_order_relaxed); }
+void request_stop_input_lost(const char* what) noexcept {
+  g_input_lost.store(what, std::memory_order_relaxed);
+  g_interrupted.store(true, std::memory_order_release);
+}
+void clear_interrupt() noexcept {
+  g_interrupted.store(false, std::memory_order_relaxed);
+  g_input_lost.store(nullptr, std::memory_order_relaxed);
+}
+bool interrupt_requested() noexcept { return g_interrupted.load(std::memory_order_acquire); }
 
 void throw_if_interrupted() {
-  if (interrupt_requested()) throw Error(ErrorCode::kInterrupted, "interrupted");
+  if (!interrupt_requested()) return;
+  if (const char* what = g_input_lost.load(std::memory_order_relaxed)) {
+    throw Error(ErrorCode::kInput, what);
+  }
+  throw Error(ErrorCode::kInterrupted, "interrupted");
 }
 
 void install_interrupt_handler() {

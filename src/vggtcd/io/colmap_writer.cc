@@ -7,6 +7,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/colmap.h"
 #include "vggtcd/io/output_file.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -17,9 +18,8 @@ constexpr int32_t kPinholeModel = 1;
 void check_names(std::span<const View> views) {
   std::set<std::string> names;
   for (const View& view : views) {
-    check(!view.name.empty() && view.name.find_first_of("\n\r") == std::string::npos,
-          "COLMAP: image names of one line");
-    check(names.insert(view.name).second, "COLMAP: distinct image names");
+    check(!view.name.empty(), "COLMAP: image names");
+    check(names.insert(single_line(view.name)).second, "COLMAP: distinct image names");
   }
 }
 
@@ -63,7 +63,7 @@ void write_colmap_text(const std::filesystem::path& directory, std::span<const V
     const Eigen::Quaterniond q = quaternion(views[i]);
     const Eigen::Vector3d& t = views[i].camera_from_world.translation;
     images += fmt::format("{} {} {} {} {} {} {} {} {} {}\n\n", i + 1, q.w(), q.x(), q.y(), q.z(),
-                          t.x(), t.y(), t.z(), i + 1, views[i].name);
+                          t.x(), t.y(), t.z(), i + 1, single_line(views[i].name));
   }
   write_text_file(directory / "cameras.txt", cameras);
   write_text_file(directory / "images.txt", images);

@@ -7,11 +7,12 @@
 #include <string_view>
 
 #include "vggtcd/core/error.h"
-#include "vggtcd/io/image_file.h"
+#include "vggtcd/io/picture_header.h"
 #ifdef VGGTCD_WITH_HEIF
 #include <libheif/heif.h>
 
 #include <memory>
+#include <vector>
 #endif
 
 namespace vggtcd {
@@ -66,9 +67,38 @@ Image image_of(const heif_image* decoded, bool has_alpha) {
   return image;
 }
 
+Exif exif_of(const heif_image_handle* handle) {
+  heif_item_id item = 0;
+  if (heif_image_handle_get_list_of_metadata_block_IDs(handle, "Exif", &item, 1) != 1) return {};
+  std::vector<std::byte> block(heif_image_handle_get_metadata_size(handle, item));
+  if (block.size() <= 4 || heif_image_handle_get_metadata(handle, item, block.data()).code != 0) {
+    return {};
+  }
+  // Where the TIFF header starts, counted from behind this number.
+  size_t skip = 0;
+  for (size_t i = 0; i < 4; ++i) skip = skip << 8 | std::to_integer<size_t>(block[i]);
+  if (skip > block.size() - 4) return {};
+  return parse_exif(std::span(block).subspan(4 + skip));
+}
+
+// Whether the file itself says how its picture is turned or mirrored. libheif 1.15 applies these
+// properties and does not tell of them.
+bool has_terms_of_its_own(std::span<const std::byte> file) {
+  const std::string_view bytes(reinterpret_cast<const char*>(file.data()), file.size());
+  const std::string_view properties = bytes.substr(0, bytes.find("mdat"));
+  return properties.find("irot") != std::string_view::npos ||
+         properties.find("imir") != std::string_view::npos;
+}
+
+bool is_avif(std::span<const std::byte> file) {
+  const std::string_view start(reinterpret_cast<const char*>(file.data()), 12);
+  return start.ends_with("avif") || start.ends_with("avis");
+}
+
 }  // namespace
 
-Image decode_heif(std::span<const std::byte> file, const std::string& name) {
+Image decode_heif(std::span<const std::byte> file, const std::string& name,
+                  const ImageReadOptions& read, PhotoFacts& facts) {
   const Owned<heif_context, heif_context_free> context(heif_context_alloc());
   require(
       heif_context_read_from_memory_without_copy(context.get(), file.data(), file.size(), nullptr),
@@ -76,6 +106,14 @@ Image decode_heif(std::span<const std::byte> file, const std::string& name) {
   heif_image_handle* found = nullptr;
   require(heif_context_get_primary_image_handle(context.get(), &found), name);
   const Owned<heif_image_handle, heif_image_handle_release> handle(found);
+  facts.exif = exif_of(handle.get());
+  const int64_t pixels =
+      int64_t{heif_image_handle_get_width(found)} * heif_image_handle_get_height(found);
+  if (pixels > kMaxPixels) {
+    throw_error(ErrorCode::kInput,
+                "{}: too large: expected at most {} megapixels, found {}; save it smaller", name,
+                kMaxPixels / 1'000'000, pixels / 1'000'000);
+  }
   const bool has_alpha = heif_image_handle_has_alpha_channel(handle.get()) != 0;
   const Owned<heif_decoding_options, heif_decoding_options_free> options(
       heif_decoding_options_alloc());
@@ -87,10 +125,12 @@ Image decode_heif(std::span<const std::byte> file, const std::string& name) {
                             options.get()),
           name);
   const Owned<heif_image, heif_image_release> owned(decoded);
-  return image_of(decoded, has_alpha);
+  const bool turn = read.apply_exif_orientation && is_avif(file) && !has_terms_of_its_own(file);
+  return turned_upright(image_of(decoded, has_alpha), turn ? facts.exif.orientation : 1);
 }
 #else
-Image decode_heif(std::span<const std::byte>, const std::string& name) {
+Image decode_heif(std::span<const std::byte>, const std::string& name, const ImageReadOptions&,
+                  PhotoFacts&) {
   throw_error(ErrorCode::kUnavailable,
               "{}: this build reads no HEIC or AVIF photos (libheif-dev was missing); build it "
               "again with libheif-dev, or convert them to JPEG (heif-convert of libheif-examples)",

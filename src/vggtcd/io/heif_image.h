@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "vggtcd/scene/image.h"
+#include "vggtcd/io/image_file.h"
 
 namespace vggtcd {
 
@@ -14,9 +14,11 @@ namespace vggtcd {
 bool is_heif(std::span<const std::byte> file);
 
 // The primary picture as its own transformations (turned, mirrored, cropped) show it; the EXIF
-// orientation, which phones write as well, is not applied a second time. 10 and 12 bits are reduced
-// to 8, alpha is blended onto white. Throws Error{kInput} naming the file if it cannot be decoded
-// completely, Error{kUnavailable} in a build without libheif.
-Image decode_heif(std::span<const std::byte> file, const std::string& name);
+// orientation, which phones write as well, is not applied a second time. An AVIF without such
+// transformations, as converters leave it, is turned as EXIF says if the options want it. 10 and 12
+// bits are reduced to 8, alpha is blended onto white. Throws Error{kInput} naming the file if it
+// cannot be decoded completely or is too large, Error{kUnavailable} in a build without libheif.
+Image decode_heif(std::span<const std::byte> file, const std::string& name,
+                  const ImageReadOptions& options, PhotoFacts& facts);
 
 }  // namespace vggtcd

@@ -1,67 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// image_file: which channels OpenCV is asked for, and what it does not tell about bad files.
+// image_file: which channels OpenCV is asked for, what it does not tell about bad files, and what
+// must not decide how much memory is taken.
 #include "vggtcd/io/image_file.h"
 
 #include <algorithm>
 #include <cstring>
 #include <limits>
-#include <opencv2/core/mat.hpp>
+#include <new>
+#include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/foreign_lines.h"
 #include "vggtcd/io/heif_image.h"
 #include "vggtcd/io/mapped_file.h"
+#include "vggtcd/io/picture_bytes.h"
+#include "vggtcd/io/picture_header.h"
 
 namespace vggtcd {
 namespace {
 
-constexpr std::string_view kPngStart{"\x89PNG\r\n\x1a\n", 8};
-constexpr std::string_view kJpegStart{"\xff\xd8\xff", 3};
-
-uint8_t byte_at(std::string_view file, size_t at) { return static_cast<uint8_t>(file[at]); }
-
-// Follows the markers of a JPEG file to its end-of-image: a decoder fills what is cut off with gray
-// and says nothing. (Bytes after the end are common: phones append videos.)
-bool is_complete_jpeg(std::string_view file) {
-  constexpr uint8_t kEndOfImage = 0xd9, kStartOfScan = 0xda;
-  size_t at = 2;
-  while (at + 4 <= file.size()) {
-    if (byte_at(file, at) != 0xff) return false;
-    const uint8_t marker = byte_at(file, at + 1);
-    if (marker == 0xff) {  // fill byte
-      ++at;
-      continue;
-    }
-    at += 2 + 256u * byte_at(file, at + 2) + byte_at(file, at + 3);
-    if (marker != kStartOfScan) continue;
-    // Coded data: 0xff is followed by 0 (a data byte) or by a restart marker, else it ends here.
-    while (at + 2 <= file.size()) {
-      const size_t next = file.find('\xff', at);
-      if (next == std::string_view::npos || next + 1 >= file.size()) return false;
-      const uint8_t code = byte_at(file, next + 1);
-      if (code == kEndOfImage) return true;
-      const bool data = code == 0 || (code >= 0xd0 && code <= 0xd7);
-      at = next + (data ? 2u : 0u);
-      if (!data) break;
-    }
-  }
-  return false;
-}
-
-// Likewise for PNG, chunk by chunk: libpng would print a line of its own.
-bool is_complete_png(std::string_view file) {
-  constexpr size_t kChunkOverhead = 12;  // length, name, CRC
-  size_t at = kPngStart.size();
-  while (at + kChunkOverhead <= file.size()) {
-    const size_t length = size_t{byte_at(file, at)} << 24 | size_t{byte_at(file, at + 1)} << 16 |
-                          size_t{byte_at(file, at + 2)} << 8 | size_t{byte_at(file, at + 3)};
-    if (length > file.size() - at - kChunkOverhead) return false;
-    if (file.substr(at + 4, 4) == "IEND") return true;
-    at += kChunkOverhead + length;
-  }
-  return false;
-}
+using internal::kJpegStart;
+using internal::kPngStart;
 
 // Formats that a phone or a failed download leaves and that no decoder here knows.
 std::string_view why_not_an_image(std::string_view file) {
@@ -84,14 +45,32 @@ bool is_rgba_png(std::string_view file) {
   return file.starts_with(kPngStart) && file.size() > kColorTypeAt && file[kColorTypeAt] == 6;
 }
 
-cv::Mat decode(std::string_view file, int flags) {
+struct Decoded {
+  cv::Mat picture;                 // empty: it cannot be decoded
+  std::vector<std::string> lines;  // what the decoder said
+  bool out_of_memory = false;
+};
+
+bool any_line_has(const std::vector<std::string>& lines, std::string_view words) {
+  return std::ranges::any_of(
+      lines, [&](const std::string& line) { return line.find(words) != std::string::npos; });
+}
+
+Decoded decode(std::string_view file, int flags) {
   // OpenCV only reads from it.
   const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<char*>(file.data()));
+  Decoded result;
+  const ForeignLines foreign;
   try {
-    return cv::imdecode(bytes, flags);
-  } catch (const cv::Exception&) {
-    return {};
+    result.picture = cv::imdecode(bytes, flags);
+  } catch (const cv::Exception& error) {
+    result.out_of_memory = error.code == cv::Error::StsNoMem;
   }
+  result.lines = foreign.lines();
+  for (const char* words : {"Insufficient memory", "Failed to allocate", "Out of memory"}) {
+    result.out_of_memory |= result.picture.empty() && any_line_has(result.lines, words);
+  }
+  return result;
 }
 
 Image rgb_from_bgr(const cv::Mat& bgr) {
@@ -135,40 +114,184 @@ Image rgb_on_white(const cv::Mat& bgra) {
   return image;
 }
 
-}  // namespace
-
-Image decode_image(std::span<const std::byte> bytes, const std::string& name,
-                   const ImageReadOptions& options) {
-  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto fail = [&](std::string_view why) {
-    throw_error(ErrorCode::kInput, "{}: not a readable photo: {}", name, why);
-  };
-  if (file.empty()) fail(why_not_an_image(file));
-  if (file.size() > size_t{std::numeric_limits<int>::max()}) fail("larger than 2 GB");
-  if (is_heif(bytes)) return decode_heif(bytes, name);
-  const bool jpeg = file.starts_with(kJpegStart);
-  const bool png = file.starts_with(kPngStart);
-  if ((jpeg && !is_complete_jpeg(file)) || (png && !is_complete_png(file))) {
-    fail(why_not_an_image(file));
-  }
-  if (is_rgba_png(file) || (!jpeg && !png)) {
-    const cv::Mat picture = decode(file, cv::IMREAD_UNCHANGED);
-    const bool rgba =
-        picture.channels() == 4 && (picture.depth() == CV_8U || picture.depth() == CV_16U);
-    if (rgba) return rgb_on_white(picture);
-    if (picture.type() == CV_16UC3) return rgb_from_bgr(high_bytes(picture));
-  }
-  int flags = cv::IMREAD_COLOR;
-  if (!options.apply_exif_orientation) flags |= cv::IMREAD_IGNORE_ORIENTATION;
-  const cv::Mat picture = decode(file, flags);
-  if (picture.empty()) fail(why_not_an_image(file));
-  check(picture.type() == CV_8UC3, "OpenCV decodes to 8-bit BGR");
-  return rgb_from_bgr(picture);
+// The sentence behind "too large" and the like.
+std::string size_in_words(const PictureHeader& header) {
+  return fmt::format("{} x {} px ({} megapixels)", header.width, header.height,
+                     header.pixels() / 1'000'000);
 }
 
-Image read_image(const std::filesystem::path& path, const ImageReadOptions& options) {
-  const MappedFile file(path);
-  return decode_image(file.bytes(), path.string(), options);
+class Decoder {
+ public:
+  Decoder(std::string_view file, const std::string& name, PhotoFacts& facts)
+      : file_(file),
+        name_(name),
+        facts_(facts),
+        header_(read_picture_header(std::as_bytes(std::span(file)))) {}
+
+  Image decode() {
+    if (file_.starts_with(kJpegStart)) return decode_jpeg();
+    if (header_ && header_->pixels() > kMaxPixels) too_large("save it smaller, or as JPEG");
+    if (is_rgba_png(file_) || !file_.starts_with(kPngStart)) {
+      const cv::Mat picture = take(vggtcd::decode(file_, cv::IMREAD_UNCHANGED), false);
+      // What could not be decoded has a type, too.
+      const bool rgba = !picture.empty() && picture.channels() == 4 &&
+                        (picture.depth() == CV_8U || picture.depth() == CV_16U);
+      if (rgba) return rgb_on_white(picture);
+      if (!picture.empty() && picture.type() == CV_16UC3) {
+        return rgb_from_bgr(high_bytes(picture));
+      }
+    }
+    return decode_color(file_, cv::IMREAD_COLOR);
+  }
+
+ private:
+  [[noreturn]] void fail(std::string_view why) const {
+    throw_error(ErrorCode::kInput, "{}: not a readable photo: {}", name_, why);
+  }
+  [[noreturn]] void too_large(std::string_view remedy) const {
+    throw_error(ErrorCode::kInput, "{}: too large: expected at most {} megapixels, found {}; {}",
+                name_, kMaxPixels / 1'000'000, size_in_words(*header_), remedy);
+  }
+
+  // The picture, and what its decoder said as remarks.
+  cv::Mat take(const Decoded& decoded, bool required = true) {
+    lines_ = decoded.lines;
+    if (decoded.out_of_memory) throw std::bad_alloc();
+    if (decoded.picture.empty() && required) fail(why_not_an_image(file_));
+    if (!decoded.picture.empty() && !decoded.lines.empty()) {
+      facts_.remarks.push_back(fmt::format(
+          "its decoder says \"{}\"{}", decoded.lines.front(),
+          decoded.lines.size() > 1 ? fmt::format(" and {} more", decoded.lines.size() - 1) : ""));
+    }
+    return decoded.picture;
+  }
+
+  Image decode_color(std::string_view file, int flags) {
+    const cv::Mat picture = take(vggtcd::decode(file, flags | cv::IMREAD_IGNORE_ORIENTATION));
+    check(picture.type() == CV_8UC3, "OpenCV decodes to 8-bit BGR");
+    return rgb_from_bgr(picture);
+  }
+
+  Image decode_jpeg() {
+    const int reduction = header_ ? jpeg_reduction(*header_) : 1;
+    if (reduction == 0) too_large("save it smaller");
+    const int flags = reduction == 8   ? cv::IMREAD_REDUCED_COLOR_8
+                      : reduction == 4 ? cv::IMREAD_REDUCED_COLOR_4
+                      : reduction == 2 ? cv::IMREAD_REDUCED_COLOR_2
+                                       : cv::IMREAD_COLOR;
+    // OpenCV fills a picture whose data run out and says nothing. Data that run into an end marker
+    // libjpeg complains about, so there are some behind the data: more than a segment that is cut
+    // off can swallow.
+    constexpr size_t kMarkers = 40'000;
+    std::string with_end(file_);
+    with_end.reserve(file_.size() + 2 * kMarkers);
+    for (size_t i = 0; i < kMarkers; ++i) with_end += "\xff\xd9";
+    Image image = decode_color(with_end, flags);
+    if (lines_.empty()) return with_remark_on(reduction, std::move(image));
+    // libjpeg prints its first complaint only, so data that ran out may hide behind another one.
+    // Then the picture depends on the markers.
+    if (decode_alone(flags).rgb != image.rgb) fail(why_not_an_image(file_));
+    if (any_line_has(lines_, "remature end of")) {
+      facts_.remarks = {
+          "part of the picture is damaged or missing in the file; copy it again, or leave it out"};
+    }
+    return with_remark_on(reduction, std::move(image));
+  }
+
+  Image decode_alone(int flags) const {
+    PhotoFacts unused;
+    return Decoder(file_, name_, unused).decode_color(file_, flags);
+  }
+
+  Image with_remark_on(int reduction, Image image) {
+    if (reduction > 1) {
+      facts_.remarks.push_back(fmt::format("its {} are decoded at 1/{} of the sides",
+                                           size_in_words(*header_), reduction));
+    }
+    return image;
+  }
+
+  std::string_view file_;
+  const std::string& name_;
+  PhotoFacts& facts_;
+  std::optional<PictureHeader> header_;
+  std::vector<std::string> lines_;  // of the last decoding
+};
+
+// Cameras are taken for pinholes, which a picture all around is not.
+void remark_on_panorama(std::string_view file, const Image& image, PhotoFacts& facts) {
+  constexpr size_t kHeaderBytes = 1 << 18;  // XMP stands in front
+  constexpr int kLeastHeight = 1000;        // px; 2 : 1 alone is no proof for a small picture
+  const std::string_view front = file.substr(0, kHeaderBytes);
+  const bool says_so = front.find("ProjectionType") != std::string_view::npos &&
+                       front.find("equirectangular") != std::string_view::npos;
+  if (!says_so && (image.width != 2 * image.height || image.height < kLeastHeight)) return;
+  facts.remarks.push_back(fmt::format(
+      "{} all around (equirectangular, 2 : 1), which no camera model here fits; cut ordinary views "
+      "out of it",
+      says_so ? "it is a panorama" : "its shape is that of a panorama"));
+}
+
+Image decode_any(std::span<const std::byte> bytes, const std::string& name,
+                 const ImageReadOptions& options, PhotoFacts& facts) {
+  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (is_heif(bytes)) {
+    const ForeignLines foreign;
+    return decode_heif(bytes, name, options, facts);
+  }
+  facts.exif = read_exif(bytes);
+  Image image = Decoder(file, name, facts).decode();
+  return turned_upright(std::move(image),
+                        options.apply_exif_orientation ? facts.exif.orientation : 1);
+}
+
+}  // namespace
+
+Image turned_upright(Image image, int orientation) {
+  if (orientation <= 1 || orientation > 8) return image;
+  const bool transposed = orientation >= 5;
+  Image result = transposed ? Image(image.height, image.width) : Image(image.width, image.height);
+  const cv::Mat from(image.height, image.width, CV_8UC3, image.rgb.data());
+  cv::Mat to(result.height, result.width, CV_8UC3, result.rgb.data());
+  constexpr int kNone = 2, kUpsideDown = 0, kSideways = 1, kBoth = -1;  // cv::flip's codes
+  constexpr int kFlip[] = {kNone, kNone,     kSideways, kBoth,      kUpsideDown,
+                           kNone, kSideways, kBoth,     kUpsideDown};
+  if (transposed) {
+    cv::transpose(from, to);
+    if (kFlip[orientation] != kNone) cv::flip(to, to, kFlip[orientation]);
+  } else {
+    cv::flip(from, to, kFlip[orientation]);
+  }
+  return result;
+}
+
+Image decode_image(std::span<const std::byte> bytes, const std::string& name,
+                   const ImageReadOptions& options, PhotoFacts* facts) {
+  PhotoFacts unasked;
+  PhotoFacts& found = facts != nullptr ? *facts : unasked;
+  found = {};
+  const std::string_view file(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (file.empty() || file.size() >= size_t{std::numeric_limits<int>::max()}) {
+    throw_error(ErrorCode::kInput, "{}: not a readable photo: {}", name,
+                file.empty() ? why_not_an_image(file) : "larger than 2 GB");
+  }
+  try {
+    Image image = decode_any(bytes, name, options, found);
+    remark_on_panorama(file, image, found);
+    return image;
+  } catch (const std::bad_alloc&) {
+    const auto header = read_picture_header(bytes);
+    throw_error(ErrorCode::kMemory,
+                "{}: does not fit into memory{}; use smaller photos, or fewer "
+                "threads (--threads)",
+                name, header ? ": " + size_in_words(*header) : "");
+  }
+}
+
+Image read_image(const std::filesystem::path& path, const ImageReadOptions& options,
+                 PhotoFacts* facts) {
+  // Not mapped: a photo that is written anew meanwhile would end the process.
+  return decode_image(read_file_bytes(path), path.string(), options, facts);
 }
 
 }  // namespace vggtcd

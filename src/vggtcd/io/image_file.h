@@ -8,25 +8,41 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "vggtcd/io/exif.h"
 #include "vggtcd/scene/image.h"
 
 namespace vggtcd {
 
 struct ImageReadOptions {
-  // Turn the picture the way its EXIF orientation says. The reference does not. HEIC and AVIF have
-  // terms of their own for it, which always hold.
+  // Turn the picture the way its EXIF orientation says. The reference does not. HEIC has terms of
+  // its own for it, which always hold, and so has AVIF; one without them is turned as EXIF says.
   bool apply_exif_orientation = true;
 };
 
+// What a file tells besides its pixels.
+struct PhotoFacts {
+  Exif exif;
+  std::vector<std::string>
+      remarks;  // what the user should know of it, each a clause without a name
+};
+
 // RGBA is blended onto white: round((c a + 255 (255 - a)) / 255); the alpha of gray and palette
-// pictures is dropped. Of 16-bit channels the high byte is taken. Throws Error{kInput} for what
-// cannot be decoded completely (a cut-off JPEG, too), naming the file.
-Image read_image(const std::filesystem::path& path, const ImageReadOptions& options = {});
+// pictures is dropped. Of 16-bit channels the high byte is taken. A JPEG of more than kMaxPixels
+// (picture_header.h) is decoded at a half, a quarter or an eighth of its sides. Whether a file is
+// readable its decoder decides: what it complains about becomes a remark. Throws, naming the file,
+// Error{kInput} for what it cannot decode, for a file whose data end before the picture does, and
+// for what is too large; Error{kMemory} where memory is short. Nothing is printed.
+Image read_image(const std::filesystem::path& path, const ImageReadOptions& options = {},
+                 PhotoFacts* facts = nullptr);
 
 // The same for a file in memory; `name` stands for it in errors.
 Image decode_image(std::span<const std::byte> bytes, const std::string& name,
-                   const ImageReadOptions& options = {});
+                   const ImageReadOptions& options = {}, PhotoFacts* facts = nullptr);
+
+// The picture turned so that an EXIF orientation of 1 to 8 becomes 1.
+Image turned_upright(Image image, int orientation);
 
 // round((c a + 255 (255 - a)) / 255).
 constexpr uint8_t on_white(int value, int alpha) {

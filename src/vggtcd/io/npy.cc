@@ -239,7 +239,11 @@ std::vector<std::string> read_npy_strings(const NpyHeader& header, const ReadByt
       const uint32_t code = step == 4 ? load<uint32_t>(bytes.data() + i)
                                       : static_cast<uint32_t>(load<uint8_t>(bytes.data() + i));
       if (code == 0) break;  // padding
-      append_utf8(text, code, what);
+      if (code >= kEscapedByte + 0x80 && code <= kEscapedByte + 0xff) {
+        text += static_cast<char>(code - kEscapedByte);
+      } else {
+        append_utf8(text, code, what);
+      }
     }
   }
   return strings;

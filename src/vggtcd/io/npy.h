@@ -58,7 +58,12 @@ template <typename T>
 void read_npy_array(const NpyHeader& header, const ReadBytes& read, std::string_view what,
                     std::span<T> target);
 
-// The strings of a <U or |S array as UTF-8 without the padding.
+// In <U, a byte of a text that is not UTF-8 stands as this plus its value (0x80 to 0xff), as
+// Python's os.fsdecode has it.
+inline constexpr char32_t kEscapedByte = 0xdc00;
+
+// The strings of a <U or |S array as UTF-8, and bytes that stand for themselves, without the
+// padding.
 std::vector<std::string> read_npy_strings(const NpyHeader& header, const ReadBytes& read,
                                           std::string_view what);
 

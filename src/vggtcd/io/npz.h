@@ -97,7 +97,7 @@ class NpzWriter {
   // Bytes 0 and 1, written as NumPy's bool.
   void add_mask(std::string_view key, std::vector<int64_t> shape, std::span<const uint8_t> mask);
   void add_mask(std::string_view key, std::vector<int64_t> shape, NpzFill<uint8_t> fill);
-  // A list of text, written as <U; copied.
+  // A list of text, written as <U; copied. read_strings gives the same bytes, UTF-8 or not.
   void add_strings(std::string_view key, std::span<const std::string> utf8);
 
   void finish();

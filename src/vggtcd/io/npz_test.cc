@@ -221,8 +221,7 @@ TEST(NpzWriter, ReaderGetsBackWhatWasAdded) {
     EXPECT_EQ(npz.read<uint8_t>("u"), u);
     EXPECT_EQ(npz.header("mask").kind, NpyKind::kBool);
     EXPECT_EQ(npz.read<uint8_t>("mask"), mask);
-    EXPECT_THAT(npz.read_strings("names"),
-                ElementsAre("a.png", "Straße 😀.jpg", "", "bad \ufffd byte"));
+    EXPECT_THAT(npz.read_strings("names"), ElementsAre("a.png", "Straße 😀.jpg", "", names[3]));
   }
 }
 

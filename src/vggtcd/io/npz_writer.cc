@@ -10,6 +10,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/io/npz.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -42,26 +43,15 @@ std::string_view npy_descr<uint8_t>() {
   return "|u1";
 }
 
-// UTF-8 to code points; bytes that are not UTF-8 (file names may hold any) become U+FFFD.
-std::u32string code_points(std::string_view utf8) {
+// UTF-8 to code points. A byte that is not UTF-8 (names of files may hold any) becomes the code
+// point that Python's os.fsdecode gives it.
+std::u32string code_points(std::string_view text) {
   std::u32string result;
-  for (size_t i = 0; i < utf8.size();) {
-    const auto lead = static_cast<unsigned char>(utf8[i]);
-    const size_t length = lead < 0x80             ? 1
-                          : (lead & 0xe0) == 0xc0 ? 2
-                          : (lead & 0xf0) == 0xe0 ? 3
-                          : (lead & 0xf8) == 0xf0 ? 4
-                                                  : 0;
-    bool valid = length > 0 && i + length <= utf8.size();
-    char32_t code = length == 1 ? lead : lead & (0xffu >> (length + 1));
-    for (size_t k = 1; valid && k < length; ++k) {
-      const auto tail = static_cast<unsigned char>(utf8[i + k]);
-      valid = (tail & 0xc0) == 0x80;
-      code = code << 6 | (tail & 0x3fu);
-    }
-    valid = valid && code <= 0x10ffff && (code < 0xd800 || code >= 0xe000);
-    result += valid ? code : U'\ufffd';
-    i += valid ? length : 1;
+  while (!text.empty()) {
+    char32_t code = 0;
+    const size_t length = utf8_length(text, &code);
+    result += length > 0 ? code : kEscapedByte + static_cast<unsigned char>(text[0]);
+    text.remove_prefix(std::max<size_t>(1, length));
   }
   return result;
 }

@@ -12,6 +12,10 @@
 #include <set>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/parallel.h"
+#include "vggtcd/io/mapped_file.h"
+#include "vggtcd/io/photo_companions.h"
+#include "vggtcd/io/picture_header.h"
 #include "vggtcd/io/video.h"
 
 namespace vggtcd {
@@ -183,8 +187,51 @@ uint64_t content_hash(const PhotoRef& photo) {
 
 bool names_photos(const std::string& source) { return ending_of(source) != ".npz"; }
 
-Image load_photo(const PhotoRef& photo, const ImageReadOptions& options) {
-  return photo.decoded ? *photo.decoded : read_image(photo.path, options);
+Image load_photo(const PhotoRef& photo, const ImageReadOptions& options, PhotoFacts* facts) {
+  if (photo.decoded) return *photo.decoded;
+  Image image = read_image(photo.path, options, facts);
+  require_photo_size(image, photo.path.string());
+  return image;
+}
+
+void require_photo_size(const Image& image, const std::string& name) {
+  constexpr int kLeastSide = 16;  // px: below, there is no place for a single key point
+  if (std::min(image.width, image.height) >= kLeastSide) return;
+  throw_error(ErrorCode::kInput,
+              "{}: expected pictures of at least {} px a side, found {} x {}; leave it out", name,
+              kLeastSide, image.width, image.height);
+}
+
+void PhotoRemarks::add(const std::string& photo, const PhotoFacts& facts) {
+  for (const std::string& remark : facts.remarks) {
+    auto at = std::ranges::find(photos_of_, remark, &decltype(photos_of_)::value_type::first);
+    if (at == photos_of_.end()) at = photos_of_.insert(at, {remark, {}});
+    at->second.push_back(photo);
+  }
+}
+
+void PhotoRemarks::report(ProgressSink& progress) const {
+  for (const auto& [remark, photos] : photos_of_) {
+    const size_t others = photos.size() - 1;
+    progress.notice(fmt::format("{}{}: {}", photos.front(),
+                                others == 0 ? "" : fmt::format(" and {} more like it", others),
+                                remark));
+  }
+}
+
+int64_t largest_decode_bytes(const std::vector<const PhotoRef*>& photos) {
+  int64_t most = 0;
+  for (const PhotoRef* photo : photos) {
+    if (photo->decoded) continue;
+    most = std::max(most, decode_bytes(read_file_bytes(photo->path)));
+  }
+  return most;
+}
+
+int photos_at_once(int64_t bytes) {
+  constexpr int64_t kBudgetBytes = 2'000'000'000;
+  const int64_t fitting = std::max<int64_t>(1, kBudgetBytes / std::max<int64_t>(1, bytes));
+  return static_cast<int>(std::min<int64_t>(num_threads(), fitting));
 }
 
 std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOptions& options,
@@ -210,7 +257,11 @@ std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOp
                                       : fmt::format("{}: {} files are not photos, such as {}",
                                                     source, found.others, found.an_other));
   }
-  leave_out_duplicates(photos, progress);
+  if (photos.size() > 1) {
+    leave_out_masks(photos, progress);
+    leave_out_duplicates(photos, progress);
+    leave_out_second_formats(photos, options.read, progress);
+  }
   if (options.max_frames > 0 && static_cast<int>(photos.size()) > options.max_frames) {
     std::vector<PhotoRef> chosen;
     for (const int i : evenly_spaced(static_cast<int>(photos.size()), options.max_frames)) {

@@ -6,16 +6,19 @@
 #include <algorithm>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #ifdef VGGTCD_WITH_VIDEO
 #include <opencv2/videoio.hpp>
 #endif
 
 #include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/parallel.h"
 
 namespace vggtcd {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -112,6 +115,80 @@ TEST(FindPhotos, LeavesOutDuplicatesWithANotice) {
   EXPECT_THAT(progress.notices, ElementsAre(HasSubstr("b.png is the same photo as a.png")));
 }
 
+// Large enough to be told apart; `step` moves what it shows.
+cv::Mat picture_of(int step) {
+  cv::Mat picture(96, 128, CV_8UC3);
+  cv::RNG(11).fill(picture, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(picture, picture, {0, 0}, 6);
+  cv::normalize(picture, picture, 0, 255, cv::NORM_MINMAX);
+  if (step == 0) return picture;
+  cv::Mat moved;
+  cv::hconcat(picture.colRange(step, 128), picture.colRange(0, step), moved);
+  return moved;
+}
+
+TEST(FindPhotos, LeavesOutMasksByTheNamesThatProgramsGiveThem) {
+  const auto folder = fresh_folder("photo_source_masks");
+  int shade = 0;
+  for (const char* name :
+       {"DJI_1.JPG", "DJI_1_mask.JPG", "DJI_2.JPG", "DJI_2_MASK.png", "a.JPG", "a.mask.png",
+        "b.jpg", "b.jpg.png", "c.png", "c-mask.png", "mask.png", "face_mask.jpg", "unmasked.jpg"}) {
+    write_photo(folder / name, ++shade);
+  }
+  RecordingProgress progress;
+  EXPECT_THAT(names_of(find_photos(folder, {}, progress)),
+              ElementsAre("DJI_1.JPG", "DJI_2.JPG", "a.JPG", "b.jpg", "c.png", "face_mask.jpg",
+                          "unmasked.jpg"));
+  EXPECT_THAT(progress.notices, ElementsAre(HasSubstr("6 files are masks")));
+  EXPECT_THAT(names_of(find_photos(folder / "*.JPG", {}, silent_progress())),
+              ElementsAre("DJI_1.JPG", "DJI_2.JPG", "a.JPG"));
+  EXPECT_THAT(names_of(find_photos(folder / "mask.png", {}, silent_progress())),
+              ElementsAre("mask.png"));
+}
+
+TEST(FindPhotos, CountsAPhotoInTwoFormatsOnceAndKeepsTwoPhotosOfOneName) {
+  const auto folder = fresh_folder("photo_source_formats");
+  cv::imwrite((folder / "one.JPG").string(), picture_of(0), {cv::IMWRITE_JPEG_QUALITY, 60});
+  cv::imwrite((folder / "one.png").string(), picture_of(0));
+  cv::imwrite((folder / "two.jpg").string(), picture_of(0));
+  cv::imwrite((folder / "two.png").string(), picture_of(12));  // edited, or another photo
+  cv::Mat small;
+  cv::resize(picture_of(24), small, {64, 48}, 0, 0, cv::INTER_AREA);
+  cv::imwrite((folder / "three.jpg").string(), small);
+  cv::imwrite((folder / "three.webp").string(), picture_of(24));
+  cv::imwrite((folder / "bad.jpg").string(), picture_of(36));
+  std::ofstream(folder / "bad.png") << "no photo";
+  RecordingProgress progress;
+  EXPECT_THAT(names_of(find_photos(folder, {}, progress)),
+              ElementsAre("bad.jpg", "bad.png", "one.JPG", "three.webp", "two.jpg", "two.png"));
+  EXPECT_THAT(progress.notices,
+              ElementsAre(AllOf(HasSubstr("2 photos repeat"), HasSubstr("one.png, three.jpg"))));
+}
+
+TEST(LoadPhoto, RefusesWhatIsTooSmallToShowAnything) {
+  const auto folder = fresh_folder("photo_source_small");
+  write_photo(folder / "a.png", 1);
+  EXPECT_INPUT_ERROR(load_photo({folder / "a.png", "a.png", nullptr}),
+                     "a.png: expected pictures of at least 16 px a side, found 6 x 4");
+}
+
+TEST(PhotoRemarks, AreToldOnceEachWithThePhotosThatTheyAreTrueOf) {
+  PhotoRemarks remarks;
+  remarks.add("before/a.png", {{}, {"bad profile"}});
+  remarks.add("before/b.png", {{}, {}});
+  remarks.add("after/a.png", {{}, {"half is missing", "bad profile"}});
+  RecordingProgress progress;
+  remarks.report(progress);
+  EXPECT_THAT(progress.notices, ElementsAre("before/a.png and 1 more like it: bad profile",
+                                            "after/a.png: half is missing"));
+}
+
+TEST(PhotosAtOnce, AreAsManyAsThreadsIfTheyAreOfOrdinarySize) {
+  EXPECT_EQ(photos_at_once(0), num_threads());
+  EXPECT_EQ(photos_at_once(1'000'000), num_threads());
+  EXPECT_EQ(photos_at_once(3'000'000'000), 1);
+}
+
 TEST(FindPhotos, RefusesWhatHoldsNoPhotosNamingIt) {
   const auto folder = fresh_folder("photo_source_empty");
   EXPECT_THAT(refusal(folder), HasSubstr("found none"));
@@ -160,6 +237,22 @@ TEST(FindPhotos, OfAVideoTakesTheSharpestFrameOfEachStretch) {
     ASSERT_EQ(frame.width, 160);
     // The frame itself, not a neighbour: its grey level, within what JPEG does to it.
     EXPECT_NEAR(frame.pixel(120, 40)[0], 10 * (3 * static_cast<int>(k) + 1), 4);
+  }
+}
+
+TEST(FindPhotos, OfAVideoWithoutAPictureWorthTheNameSaysSo) {
+  const auto path = fresh_folder("photo_source_tiny_video") / "tiny.avi";
+  for (const int side : {8, 64}) {
+    {
+      cv::VideoWriter video(path.string(), cv::CAP_FFMPEG,
+                            cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10, {side, side});
+      for (int i = 0; i < (side == 8 ? 5 : 1); ++i) {
+        video.write(cv::Mat(side, side, CV_8UC3, cv::Scalar::all(20 * i)));
+      }
+    }
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "OpenCV cannot write videos here";
+    EXPECT_THAT(refusal(path), HasSubstr(side == 8 ? "tiny.avi: expected pictures of at least 16 px"
+                                                   : "tiny.avi: expected a video, found a single"));
   }
 }
 

@@ -16,6 +16,7 @@
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/pose_matrix.h"
 #include "vggtcd/io/prediction_layout.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -109,26 +110,41 @@ Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std:
   return {k[0], k[4], k[2], k[5], static_cast<int>(layout.width), static_cast<int>(layout.height)};
 }
 
-// The photos' names, without directories. Results are named after them without the extension, so
-// names that are empty, longer than a file's name may be, or not distinct then are of no use and
-// are replaced like missing ones.
-constexpr size_t kMaxStemBytes = 251;  // and four for .png
+// The name without directories. A backslash is one of Windows only in a path that begins like one
+// there; in other names it is a character like any.
+std::string base_name(const std::string& path) {
+  std::string name = path.substr(path.find_last_of('/') + 1);
+  const bool of_windows = name.starts_with('\\') || (name.size() > 2 && name.substr(1, 2) == ":\\");
+  return of_windows ? name.substr(name.find_last_of('\\') + 1) : name;
+}
+
+// Results are named after photos: names that are empty, not distinct or longer than a file's name
+// may be are of no use.
+bool can_name_files(const std::vector<std::string>& names) {
+  constexpr size_t kMaxBytes = 251;  // and four for .png
+  std::set<std::string> files, stems;
+  size_t longest_name = 0, longest_stem = 0;
+  for (const std::string& name : names) {
+    if (name.empty() || name == "." || name == "..") return false;
+    const std::string file = single_line(name);
+    const std::string stem = std::filesystem::path(file).stem().string();
+    longest_name = std::max(longest_name, file.size());
+    longest_stem = std::max(longest_stem, stem.size());
+    files.insert(file);
+    stems.insert(stem);
+  }
+  const bool by_stem = stems.size() == names.size();
+  return files.size() == names.size() && (by_stem ? longest_stem : longest_name) <= kMaxBytes;
+}
+
 std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout& layout) {
   std::vector<std::string> names;
   if (npz.has("names")) {
     npz.expect_shape("names", std::vector<int64_t>{layout.frames});
-    for (const std::string& path : npz.read_strings("names")) {
-      std::string name = path.substr(path.find_last_of("/\\") + 1);
-      std::erase_if(name, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-      if (name.empty() || name == "." || name == "..") continue;
-      if (std::filesystem::path(name).stem().string().size() > kMaxStemBytes) continue;
-      names.push_back(name);
-    }
+    for (const std::string& path : npz.read_strings("names")) names.push_back(base_name(path));
   }
-  std::set<std::string> stems;
-  for (const std::string& name : names) stems.insert(std::filesystem::path(name).stem().string());
   const size_t frames = static_cast<size_t>(layout.frames);
-  if (stems.size() != frames || names.size() != frames) {
+  if (names.size() != frames || !can_name_files(names)) {
     names.clear();
     for (size_t i = 0; i < frames; ++i) names.push_back(fmt::format("frame_{:06d}", i));
   }

@@ -309,7 +309,7 @@ TEST(ReadReconstruction, TooFewFramesAreDegenerate) {
   }
 }
 
-TEST(ReadReconstruction, NamesLoseDirectoriesAndMustBeDistinct) {
+TEST(ReadReconstruction, NamesLoseDirectoriesAndMustBeDistinctAndAreElseKeptToTheByte) {
   const auto names_of = [](std::vector<std::string> names) {
     Fixture f;
     const Arrays arrays = Arrays::vggt();
@@ -326,11 +326,19 @@ TEST(ReadReconstruction, NamesLoseDirectoriesAndMustBeDistinct) {
     return result;
   };
   EXPECT_THAT(names_of({"x/a.jpg", "../../b.jpg", "C:\\c.jpg", "d\n.jpg"}),
-              ElementsAre("a.jpg", "b.jpg", "c.jpg", "d.jpg"));
+              ElementsAre("a.jpg", "b.jpg", "c.jpg", "d\n.jpg"));
+  const std::vector<std::string> unusual = {"caf\xe9.jpg", "\x1b[31m.jpg", "caf\xc3\xa9.jpg",
+                                            "a\\b"};
+  EXPECT_EQ(names_of(unusual), unusual);
+  const std::vector<std::string> one_stem = {"a.jpg", "a.png", "c", "d"};
+  EXPECT_EQ(names_of(one_stem), one_stem);
+  const std::vector<std::string> longest = {std::string(251, 'x') + ".jpg", "b", "c", "d"};
+  EXPECT_EQ(names_of(longest), longest);
   const auto numbered = ElementsAre("frame_000000", "frame_000001", "frame_000002", "frame_000003");
   EXPECT_THAT(names_of({"x/a.jpg", "y/a.jpg", "b.jpg", "c.jpg"}), numbered);
   EXPECT_THAT(names_of({"a", "b", "..", "d"}), numbered);
-  EXPECT_THAT(names_of({"a.jpg", "a.png", "c", "d"}), numbered);
+  EXPECT_THAT(names_of({"a\n.jpg", "a\\x0a.jpg", "c", "d"}), numbered);  // one as names of files
+  EXPECT_THAT(names_of({std::string(252, 'x') + ".jpg", "b", "c", "d"}), numbered);
 }
 
 // Two epochs of four frames and a joint file with two keyframes of each.

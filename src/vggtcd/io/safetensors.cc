@@ -261,6 +261,7 @@ void write_safetensors(const std::filesystem::path& path, std::span<const Tensor
     fill(i, data);
     file.write(data);
   }
+  throw_if_interrupted();  // the last tensor may come from a file that was cut off meanwhile
   file.commit();
 }
 

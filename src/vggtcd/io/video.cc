@@ -11,6 +11,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "vggtcd/core/interrupt.h"
+#include "vggtcd/io/foreign_lines.h"
 #endif
 
 namespace vggtcd {
@@ -25,18 +26,36 @@ Image image_of(const cv::Mat& bgr) {
   return image;
 }
 
+// A video whose reader prints nothing.
+class Video {
+ public:
+  explicit Video(const std::string& path) {
+    setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // we say ourselves what is wrong
+    const ForeignLines foreign;
+    // One backend, not whichever OpenCV finds first: they count and seek frames differently.
+    video_.open(path, cv::CAP_FFMPEG);
+    if (video_.isOpened()) expected_frames_ = video_.get(cv::CAP_PROP_FRAME_COUNT);
+  }
+  bool read(cv::Mat& frame) {
+    const ForeignLines foreign;
+    return video_.isOpened() && video_.read(frame) && !frame.empty();
+  }
+  double expected_frames() const { return expected_frames_; }  // a guess; 0: none
+
+ private:
+  cv::VideoCapture video_;
+  double expected_frames_ = 0;
+};
+
 // Calls use(number, frame) for every frame, and advance(share); returns how many frames there are.
 template <typename Use, typename Advance>
 int for_each_frame(const std::string& path, const Use& use, const Advance& advance) {
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // we say ourselves what is wrong
-  // One backend, not whichever OpenCV finds first: they count and seek frames differently.
-  cv::VideoCapture video(path, cv::CAP_FFMPEG);
-  const double expected = video.isOpened() ? video.get(cv::CAP_PROP_FRAME_COUNT) : 0;  // a guess
+  Video video(path);
   int count = 0;
-  for (cv::Mat frame; video.isOpened() && video.read(frame); ++count) {
+  for (cv::Mat frame; video.read(frame); ++count) {
     throw_if_interrupted();
     use(count, frame);
-    if (expected > 0) advance(std::min(1.0, (count + 1) / expected));
+    if (video.expected_frames() > 0) advance(std::min(1.0, (count + 1) / video.expected_frames()));
   }
   return count;
 }
@@ -48,7 +67,8 @@ std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSi
   std::vector<double> sharp;
   const int count = for_each_frame(
       path,
-      [&](int, const cv::Mat& frame) {
+      [&](int number, const cv::Mat& frame) {
+        if (number == 0) require_photo_size(image_of(frame), path);
         // A quarter of the size is enough to rank by, and sixteen times faster.
         cv::Mat small;
         cv::resize(frame, small, {}, 0.25, 0.25, cv::INTER_AREA);
@@ -60,6 +80,13 @@ std::vector<PhotoRef> read_video(const std::string& path, int frames, ProgressSi
                 "{}: expected a video, found no frame that can be decoded; convert it, or extract "
                 "photos from it (ffmpeg -i VIDEO photos/%04d.jpg)",
                 path);
+  }
+  if (count == 1) {
+    throw_error(
+        ErrorCode::kInput,
+        "{}: expected a video, found a single picture, perhaps its cover; extract photos from "
+        "the video itself (ffmpeg -i VIDEO -map 0:V photos/%04d.jpg)",
+        path);
   }
   const int wanted = std::min(frames, count);
   std::vector<int> chosen;

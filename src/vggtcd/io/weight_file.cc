@@ -6,6 +6,7 @@
 #include <array>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/interrupt.h"
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/safetensors.h"
 #include "vggtcd/io/torch_checkpoint.h"
@@ -80,7 +81,14 @@ WeightFile open_weight_file(const std::filesystem::path& path) {
                 path.string());
   }
   const auto mapped = std::make_shared<const MappedFile>(path);
-  WeightFile file = parse_weight_file(mapped->bytes(), path.string());
+  WeightFile file = [&] {
+    try {
+      return parse_weight_file(mapped->bytes(), path.string());
+    } catch (const Error&) {
+      throw_if_interrupted();  // a file that was cut off meanwhile explains it better
+      throw;
+    }
+  }();
   // Both the mapping and what the parser had to copy must live as long as the tensors.
   file.storage = std::make_shared<const std::array<std::shared_ptr<const void>, 2>>(
       std::array<std::shared_ptr<const void>, 2>{mapped, file.storage});

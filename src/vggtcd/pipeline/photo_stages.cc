@@ -14,6 +14,7 @@
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/predictions.h"
+#include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/job_plan.h"
 #include "vggtcd/scene/frame_image.h"
 
@@ -177,8 +178,8 @@ std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& option
   ReconstructionPlan plan = reconstructor->plan(photos);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
   if (fs::exists(kept / kComplete)) {
-    plan.note =
-        fmt::format("none: reconstruction of an earlier run is used again ({})", kept.string());
+    plan.note = fmt::format("none: reconstruction of an earlier run is used again ({})",
+                            escaped(kept.string()));
     plan.stages.clear();
     plan.memory_bytes = 0;
   } else {

@@ -15,6 +15,7 @@
 #include "vggtcd/io/trajectory.h"
 #include "vggtcd/io/tum.h"
 #include "vggtcd/report/heat_map.h"
+#include "vggtcd/report/overlay_names.h"
 #include "vggtcd/scene/point_cloud.h"
 
 namespace vggtcd {
@@ -317,6 +318,9 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
 void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,
                     const EpochChange& change, const ChangeSet& changes) {
   std::filesystem::create_directories(directory);
+  std::vector<std::string> names;
+  for (const View& view : epoch.views) names.push_back(view.name);
+  const std::vector<std::string> files = overlay_names(names);
   const size_t per_frame = epoch.pixels_per_frame();
   parallel_for(epoch.num_frames(), 1, [&](int64_t frame, int64_t) {
     const size_t index = static_cast<size_t>(frame);
@@ -328,8 +332,7 @@ void write_overlays(const std::filesystem::path& directory, const Reconstruction
                              epoch.width, {changes.threshold_u, changes.bound_u})
             : render_label_overlay(color, std::span(change.label).subspan(first, per_frame),
                                    epoch.height, epoch.width);
-    const std::string stem = std::filesystem::path(epoch.views[index].name).stem().string();
-    write_png(directory / (stem + ".png"), overlay);
+    write_png(directory / files[index], overlay);
   });
 }
 

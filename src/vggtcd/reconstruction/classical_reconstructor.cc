@@ -55,25 +55,38 @@ std::optional<KnownCamera> known_camera(const EpochPhotos& epoch, const Image& r
                      scale * (median(&Pinhole::cy) + 0.5) - 0.5};
 }
 
+std::vector<const PhotoRef*> all_photos(const PhotoEpochs& photos) {
+  std::vector<const PhotoRef*> all;
+  for (const PhotoRef& photo : photos.before.photos) all.push_back(&photo);
+  for (const PhotoRef& photo : photos.after.photos) all.push_back(&photo);
+  return all;
+}
+
 // Loads, reducing each at once: a hundred photos of a telephone would not fit otherwise.
 SfmPhotos load(const PhotoEpochs& photos, int max_side_px, ProgressSink& progress) {
   ProgressStage stage(progress, "read photos");
   SfmPhotos loaded;
   loaded.num_before = static_cast<int>(photos.before.photos.size());
-  std::vector<const PhotoRef*> all;
-  for (const PhotoRef& photo : photos.before.photos) all.push_back(&photo);
-  for (const PhotoRef& photo : photos.after.photos) all.push_back(&photo);
+  const std::vector<const PhotoRef*> all = all_photos(photos);
   loaded.images.resize(all.size());
+  std::vector<PhotoFacts> facts(all.size());
   const auto count = static_cast<int64_t>(all.size());
-  const int64_t slab = num_threads();
+  const int64_t slab = photos_at_once(largest_decode_bytes(all));
   for (int64_t first = 0; first < count; first += slab) {
     parallel_for(std::min(slab, count - first), 1, [&](int64_t from, int64_t to) {
       for (auto i = static_cast<size_t>(first + from); i < static_cast<size_t>(first + to); ++i) {
-        loaded.images[i] = reduced_photo(load_photo(*all[i], photos.read), max_side_px);
+        loaded.images[i] = reduced_photo(load_photo(*all[i], photos.read, &facts[i]), max_side_px);
       }
     });
     stage.advance(static_cast<double>(first + slab) / static_cast<double>(count));
   }
+  PhotoRemarks remarks;
+  for (size_t i = 0; i < all.size(); ++i) {
+    const char* epoch = i < photos.before.photos.size() ? "before" : "after";
+    remarks.add(fmt::format("{}/{}", epoch, all[i]->name), facts[i]);
+    loaded.exif.push_back(std::move(facts[i].exif));
+  }
+  remarks.report(progress);
   const std::string_view wanted = orientation_of(loaded.images.front());
   for (size_t i = 0; i < all.size(); ++i) {
     if (orientation_of(loaded.images[i]) == wanted) continue;
@@ -239,7 +252,7 @@ void renumber(const EpochPhotos& photos, const Reconstruction& placed,
 
 std::string ClassicalReconstructor::fingerprint() const {
   return fmt::format(
-      "classical 4; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
+      "classical 5; keyframes {}; side {}; features {}; planes {}; best {}; sources {}",
       options_.keyframes, options_.frame_side_px, options_.sfm.max_features,
       options_.depth.sweep.num_planes, options_.depth.sweep.best_views, options_.views.max_sources);
 }
@@ -261,10 +274,16 @@ ReconstructionPlan ClassicalReconstructor::plan(const PhotoEpochs& photos) const
   const double frames = plan.frames_before + plan.frames_after;
   const double pixels = static_cast<double>(size.width) * size.height;
   const double planes = options_.depth.sweep.num_planes;
-  // Cost volume and its sums per thread; maps, colours and the reduced photos per frame.
+  // Cost volume and its sums per thread; maps, colours and the reduced photos per frame. Before
+  // that, photos are decoded.
   const double volume = pixels * planes * 3.2;
-  plan.memory_bytes =
-      static_cast<int64_t>(volume * num_threads() + frames * (pixels * 40 + 4e6) + 3e8);
+  constexpr double kReducedPhotoBytes = 4e6, kFixedBytes = 3e8;
+  const int64_t photo_bytes = largest_decode_bytes(all_photos(photos));
+  const double decoding = static_cast<double>(photo_bytes) * photos_at_once(photo_bytes);
+  plan.memory_bytes = static_cast<int64_t>(
+      std::max(volume * num_threads() + frames * (pixels * 40 + kReducedPhotoBytes),
+               decoding + frames * kReducedPhotoBytes) +
+      kFixedBytes);
   const double threads = num_threads();
   const double pairs = frames * (frames - 1) / 2;
   const double photo_pixels = static_cast<double>(first.width) * first.height;

@@ -55,7 +55,7 @@ class Reconstructor {
   // The joint reconstruction is another estimate, in another frame, than the epochs' own.
   virtual bool has_own_joint_pass() const = 0;
   virtual std::string fingerprint() const = 0;  // all that its result depends on besides the photos
-  // Reads no more than one photo.
+  // Decodes no more than one photo; reads the headers of all.
   virtual ReconstructionPlan plan(const PhotoEpochs& photos) const = 0;
   // Reads all photos and throws what reconstruct() would throw before its long stages: for a photo
   // that cannot be decoded, and for photos that do not go together.

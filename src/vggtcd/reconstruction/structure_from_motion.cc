@@ -8,9 +8,12 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <set>
+#include <span>
 
 #include "vggtcd/reconstruction/child_process.h"
 #include "vggtcd/reconstruction/match_file.h"
+#include "vggtcd/reconstruction/photo_cameras.h"
 
 namespace vggtcd {
 namespace {
@@ -20,14 +23,34 @@ namespace fs = std::filesystem;
 constexpr const char* kRemedy =
     "install COLMAP (Debian: apt-get install colmap), or give network weights with --weights";
 
-// Names by which COLMAP sorts as we do; one folder for each camera.
-std::vector<std::string> colmap_names(const SfmPhotos& photos) {
-  std::vector<std::string> names;
+// A photo as COLMAP gets it: one folder for each camera, names by which it sorts as we do.
+struct ColmapPhoto {
+  std::string name;
+  bool before = true;
+  double focal_factor = 0;  // of the longer side; 0: to be guessed
+};
+
+std::vector<ColmapPhoto> colmap_photos(const SfmPhotos& photos) {
+  const std::span exif(photos.exif);
+  const auto num_before = static_cast<size_t>(photos.num_before);
+  const PhotoCameras cameras[] = {photo_cameras(exif.first(num_before)),
+                                  photo_cameras(exif.subspan(num_before))};
+  std::vector<ColmapPhoto> result;
   for (size_t i = 0; i < photos.images.size(); ++i) {
-    const bool before = static_cast<int>(i) < photos.num_before;
-    names.push_back(fmt::format("{}_{}x{}/{:06d}.pgm", before ? "t1" : "t2", photos.images[i].width,
-                                photos.images[i].height, i));
+    const bool before = i < num_before;
+    const PhotoCameras& of_epoch = cameras[before ? 0 : 1];
+    const int camera = of_epoch.camera_of[before ? i : i - num_before];
+    const Image& image = photos.images[i];
+    result.push_back({fmt::format("{}_{}x{}{}/{:06d}.pgm", before ? "t1" : "t2", image.width,
+                                  image.height, camera == 0 ? "" : fmt::format("_c{}", camera), i),
+                      before, of_epoch.focal_of[static_cast<size_t>(camera)]});
   }
+  return result;
+}
+
+std::vector<std::string> names_of(const std::vector<ColmapPhoto>& photos) {
+  std::vector<std::string> names;
+  for (const ColmapPhoto& photo : photos) names.push_back(photo.name);
   return names;
 }
 
@@ -102,11 +125,12 @@ class Colmap {
 // What COLMAP is given: images/, features/, matches.txt and the cameras.
 class Mapper {
  public:
-  Mapper(const SfmPhotos& photos, const std::vector<std::string>& names,
+  Mapper(const SfmPhotos& photos, const std::vector<ColmapPhoto>& listed,
          const SparseMatches& matches, const SfmOptions& options, fs::path folder)
-      : photos_(photos), names_(names), options_(options), folder_(std::move(folder)) {
+      : photos_(photos), listed_(listed), options_(options), folder_(std::move(folder)) {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
+    const std::vector<std::string> names = names_of(listed);
     for (size_t i = 0; i < names.size(); ++i) {
       write_image(photos.images[i], folder_ / "images" / names[i]);
       write_features(matches.features[i], folder_ / "features" / (names[i] + ".txt"));
@@ -121,13 +145,13 @@ class Mapper {
     const std::string database = (folder_ / fmt::format("focal_{}.db", focal_factor)).string();
     const fs::path models = folder_ / fmt::format("focal_{}", focal_factor);
     fs::create_directories(models);
-    for (const bool before : {true, false}) import(colmap, before, focal_factor, database);
+    for (const bool before : {true, false}) import_epoch(colmap, before, focal_factor, database);
     colmap.run({"matches_importer", "--database_path", database, "--match_list_path",
                 (folder_ / "matches.txt").string(), "--match_type", "raw", "--SiftMatching.use_gpu",
                 "0", "--SiftMatching.num_threads", "1", "--SiftMatching.min_num_inliers",
                 std::to_string(options_.min_pair_inliers)});
     const auto show = [&] {
-      stage.advance(0.98 * colmap.placed() / static_cast<double>(names_.size()));
+      stage.advance(0.98 * colmap.placed() / static_cast<double>(listed_.size()));
     };
     const int status = colmap.status({"mapper",
                                       "--database_path",
@@ -164,14 +188,32 @@ class Mapper {
   }
 
  private:
-  void import(const Colmap& colmap, bool before, double focal_factor,
-              const std::string& database) const {
-    const auto& known = before ? photos_.camera_t1 : photos_.camera_t2;
-    const fs::path list = folder_ / (before ? "t1.txt" : "t2.txt");
-    std::ofstream out(list);
-    for (size_t i = 0; i < names_.size(); ++i) {
-      if ((static_cast<int>(i) < photos_.num_before) == before) out << names_[i] << "\n";
+  // The cameras whose focal length is to be guessed together, each of the others alone.
+  void import_epoch(const Colmap& colmap, bool before, double focal_factor,
+                    const std::string& database) const {
+    std::set<double> known_factors;
+    for (const ColmapPhoto& photo : listed_) {
+      if (photo.before == before) known_factors.insert(photo.focal_factor);
     }
+    int part = 0;
+    for (const double known : known_factors) {
+      std::vector<std::string> names;
+      for (const ColmapPhoto& photo : listed_) {
+        if (photo.before == before && photo.focal_factor == known) names.push_back(photo.name);
+      }
+      const std::string list =
+          fmt::format("t{}{}.txt", before ? 1 : 2, part == 0 ? "" : fmt::format("_{}", part));
+      import_photos(colmap, before, names, folder_ / list, known > 0 ? known : focal_factor,
+                    database);
+      ++part;
+    }
+  }
+
+  void import_photos(const Colmap& colmap, bool before, const std::vector<std::string>& names,
+                     const fs::path& list, double focal_factor, const std::string& database) const {
+    const auto& known = before ? photos_.camera_t1 : photos_.camera_t2;
+    std::ofstream out(list);
+    for (const std::string& name : names) out << name << "\n";
     if (!out.flush()) throw_error(ErrorCode::kOutput, "{}: cannot be written", list.string());
     std::vector<std::string> arguments = {"feature_importer",
                                           "--database_path",
@@ -198,7 +240,7 @@ class Mapper {
   }
 
   const SfmPhotos& photos_;
-  const std::vector<std::string>& names_;
+  const std::vector<ColmapPhoto>& listed_;
   const SfmOptions& options_;
   fs::path folder_;
 };
@@ -221,14 +263,14 @@ SparseMatches find_matches(const std::vector<Image>& images, const SfmOptions& o
 
 // Stage 2: COLMAP's model, from scratch/model if it is there; an empty folder says that none was
 // found.
-SfmModel find_model(const SfmPhotos& photos, const std::vector<std::string>& names,
+SfmModel find_model(const SfmPhotos& photos, const std::vector<ColmapPhoto>& listed,
                     const SparseMatches& matches, const SfmOptions& options,
                     const fs::path& scratch, ProgressSink& progress) {
   const fs::path kept = scratch / "model";
   if (!fs::exists(kept)) {
     ProgressStage stage(progress, "structure from motion");
     constexpr double kEnough = 0.9;
-    const Mapper mapper(photos, names, matches, options, scratch / "colmap");
+    const Mapper mapper(photos, listed, matches, options, scratch / "colmap");
     std::optional<fs::path> best;
     size_t most = 0;
     for (const double focal_factor : {1.2, 0.85}) {
@@ -238,7 +280,7 @@ SfmModel find_model(const SfmPhotos& photos, const std::vector<std::string>& nam
         most = views;
         best = found;
       }
-      if (static_cast<double>(views) >= kEnough * static_cast<double>(names.size())) break;
+      if (static_cast<double>(views) >= kEnough * static_cast<double>(listed.size())) break;
     }
     const fs::path empty = scratch / "colmap" / "none";
     fs::create_directories(empty);
@@ -273,10 +315,12 @@ SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const fs::path& scratch, ProgressSink& progress) {
   options.validate();
   fs::create_directories(scratch);
-  const std::vector<std::string> names = colmap_names(photos);
+  check(photos.exif.size() == photos.images.size(), "structure_from_motion: EXIF of each photo");
+  const std::vector<ColmapPhoto> listed = colmap_photos(photos);
+  const std::vector<std::string> names = names_of(listed);
   SparseMatches matches = find_matches(photos.images, options, scratch, progress);
   SfmResult result;
-  result.model = find_model(photos, names, matches, options, scratch, progress);
+  result.model = find_model(photos, listed, matches, options, scratch, progress);
   result.pairs = std::move(matches.pairs);
   result.reduced = std::move(photos.images);
   for (const SfmView& view : result.model.views) {

@@ -9,6 +9,7 @@
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
 #include "vggtcd/features/features.h"
+#include "vggtcd/io/exif.h"
 #include "vggtcd/reconstruction/colmap_model.h"
 
 namespace vggtcd {
@@ -35,6 +36,7 @@ struct KnownCamera {
 // The photos of one job, reduced: both epochs, before first.
 struct SfmPhotos {
   std::vector<Image> images;
+  std::vector<Exif> exif;  // of each photo
   int num_before = 0;
   std::optional<KnownCamera> camera_t1, camera_t2;  // of all photos of the epoch
 };
@@ -51,11 +53,12 @@ void require_colmap();
 
 // Features and matches by features.h, then COLMAP's incremental mapper as a child process with one
 // thread (its results depend on the number of threads). Cameras are SIMPLE_RADIAL, one for each
-// epoch and photo size; their focal lengths start at 1.2 and, where that leaves photos out, at 0.85
-// times the longer side. Known ones are SIMPLE_PINHOLE and start as they are. Chosen is the model
-// with most photos. `scratch` keeps the two stages, matches.npz and model/; what an earlier call
-// with the same photos and options left there is used. Throws Error{kUnavailable} without COLMAP; a
-// model without views if none was found.
+// epoch, photo size, and device, lens, focal length and zoom as EXIF tells them (photo_cameras.h);
+// their focal lengths start at 1.2 and, where that leaves photos out, at 0.85 times the longer
+// side, or, where an epoch has several lenses, where EXIF says. Known ones are SIMPLE_PINHOLE and
+// start as they are. Chosen is the model with most photos. `scratch` keeps the two stages,
+// matches.npz and model/; what an earlier call with the same photos and options left there is used.
+// Throws Error{kUnavailable} without COLMAP; a model without views if none was found.
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const std::filesystem::path& scratch, ProgressSink& progress);
 

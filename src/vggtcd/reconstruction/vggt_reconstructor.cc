@@ -25,22 +25,39 @@ struct Frames {
   std::vector<std::string> names;
 };
 
-Image fitted(const PhotoRef& photo, const ImageReadOptions& read, int side) {
-  return fit_photo(load_photo(photo, read), FitMode::kCrop, photo.name, side);
+Image fitted(const PhotoRef& photo, const ImageReadOptions& read, int side,
+             PhotoFacts* facts = nullptr) {
+  return fit_photo(load_photo(photo, read, facts), FitMode::kCrop, photo.name, side);
 }
 
-// The images of a given prediction are frames already.
-Frames frames_of(const EpochPhotos& epoch, const ImageReadOptions& read, int side, size_t done,
-                 size_t of_all, ProgressStage& stage) {
-  Frames frames;
-  for (const PhotoRef& photo : epoch.photos) {
-    throw_if_interrupted();
-    frames.images.push_back(epoch.given ? load_photo(photo, read) : fitted(photo, read, side));
-    frames.names.push_back(photo.name);
-    stage.advance(static_cast<double>(done + frames.images.size()) / static_cast<double>(of_all));
+// Reads frames epoch by epoch. The images of a given prediction are frames already.
+class FrameReader {
+ public:
+  FrameReader(const ImageReadOptions& read, int side, size_t num_photos, ProgressStage& stage)
+      : read_(read), side_(side), num_photos_(num_photos), stage_(stage) {}
+
+  Frames read(const EpochPhotos& epoch, const char* name) {
+    Frames frames;
+    for (const PhotoRef& photo : epoch.photos) {
+      throw_if_interrupted();
+      PhotoFacts facts;
+      frames.images.push_back(epoch.given ? load_photo(photo, read_)
+                                          : fitted(photo, read_, side_, &facts));
+      frames.names.push_back(photo.name);
+      remarks_.add(fmt::format("{}/{}", name, photo.name), facts);
+      stage_.advance(static_cast<double>(++done_) / static_cast<double>(num_photos_));
+    }
+    return frames;
   }
-  return frames;
-}
+  const PhotoRemarks& remarks() const { return remarks_; }
+
+ private:
+  const ImageReadOptions& read_;
+  int side_;
+  size_t num_photos_, done_ = 0;
+  ProgressStage& stage_;
+  PhotoRemarks remarks_;
+};
 
 void require_one_size(const Frames& frames, const char* epoch, const Image& model,
                       const std::string& model_name) {
@@ -58,10 +75,11 @@ void require_one_size(const Frames& frames, const char* epoch, const Image& mode
 // Both epochs, all frames of one size: that of a given prediction, else of the first photo.
 std::pair<Frames, Frames> read_epochs(const PhotoEpochs& photos, int side, ProgressSink& progress) {
   ProgressStage stage(progress, "read photos");
-  const size_t num_before = photos.before.photos.size();
-  const size_t all = num_before + photos.after.photos.size();
-  Frames before = frames_of(photos.before, photos.read, side, 0, all, stage);
-  Frames after = frames_of(photos.after, photos.read, side, num_before, all, stage);
+  FrameReader reader(photos.read, side, photos.before.photos.size() + photos.after.photos.size(),
+                     stage);
+  Frames before = reader.read(photos.before, "before");
+  Frames after = reader.read(photos.after, "after");
+  reader.remarks().report(progress);
   const bool model_is_before = photos.before.given || !photos.after.given;
   const Frames& first = model_is_before ? before : after;
   const std::string model_name = (model_is_before ? "before/" : "after/") + first.names.front();
@@ -196,6 +214,12 @@ ReconstructionPlan VggtReconstructor::plan(const PhotoEpochs& photos) const {
     add(stage_name(VggtStage::kCameras), cameras, 0);
     add(stage_name(VggtStage::kDepth), depth, kFrameSeconds * pass.frames);
   }
+  std::vector<const PhotoRef*> all;  // read one after another
+  for (const EpochPhotos* epoch : {&photos.before, &photos.after}) {
+    for (const PhotoRef& photo : epoch->photos) all.push_back(&photo);
+  }
+  constexpr int64_t kFixedBytes = 100'000'000;
+  plan.memory_bytes = std::max(plan.memory_bytes, largest_decode_bytes(all) + kFixedBytes);
   plan.note = fmt::format(
       "vggt: {:.1f} TFLOP in {} passes, precision {} on {}; products measured here: {:.2f} TFLOP/s "
       "on {} threads",

@@ -21,6 +21,7 @@ constexpr int kLegendHeight = 34;  // px below them
 constexpr double kFontScale = 0.4;
 constexpr int kMinPanelWidth =
     360;  // px: smaller photos are enlarged so that the legend can be read
+constexpr int kMaxEnlargedHeight = 4096;  // px: but not a frame of a few columns to gigabytes
 
 cv::Scalar grey(int level) { return cv::Scalar::all(level); }
 
@@ -72,7 +73,7 @@ float luma_of(const uint8_t* rgb) { return 0.299f * rgb[0] + 0.587f * rgb[1] + 0
 // rest is the legend's.
 template <typename Paint>
 Image beside_photo(std::span<const uint8_t> rgb, int height, int width, Paint&& paint) {
-  const int zoom = overlay_zoom(width);
+  const int zoom = overlay_zoom(width, height);
   const int panel_width = zoom * width, panel_height = zoom * height;
   Image out(2 * panel_width + kGap, panel_height + kLegendHeight);
   std::fill_n(out.rgb.data(), out.rgb.size(), kBackground);
@@ -111,8 +112,9 @@ std::array<uint8_t, 3> heat_color(float fraction) {
   return color;
 }
 
-int overlay_zoom(int width) {
-  return std::max(1, (kMinPanelWidth + width - 1) / std::max(1, width));
+int overlay_zoom(int width, int height) {
+  const int wanted = (kMinPanelWidth + width - 1) / std::max(1, width);
+  return std::max(1, std::min(wanted, kMaxEnlargedHeight / std::max(1, height)));
 }
 
 Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score, int height,
@@ -129,7 +131,7 @@ Image render_overlay(std::span<const uint8_t> rgb, std::span<const float> score,
     }
   });
   cv::Mat canvas(out.height, out.width, CV_8UC3, out.rgb.data());
-  const int panel_width = overlay_zoom(width) * width, top = overlay_zoom(width) * height;
+  const int zoom = overlay_zoom(width, height), panel_width = zoom * width, top = zoom * height;
   draw_text(canvas, "grey: no evidence", panel_width / 2, top + 20);
   draw_legend(canvas, panel_width + kGap, top, panel_width, scale);
   return out;
@@ -167,7 +169,7 @@ Image render_label_overlay(std::span<const uint8_t> rgb, std::span<const ChangeL
     }
   });
   cv::Mat canvas(out.height, out.width, CV_8UC3, out.rgb.data());
-  const int panel_width = overlay_zoom(width) * width, top = overlay_zoom(width) * height;
+  const int zoom = overlay_zoom(width, height), panel_width = zoom * width, top = zoom * height;
   draw_text(canvas, "dim photo: no evidence", panel_width / 2, top + 20);
   draw_label_legend(canvas, panel_width + kGap, top);
   return out;

@@ -37,8 +37,8 @@ std::array<uint8_t, 3> label_color(ChangeLabel label);
 Image render_label_overlay(std::span<const uint8_t> rgb, std::span<const ChangeLabel> label,
                            int height, int width);
 
-// Each pixel of a photo of this width is a square of so many pixels in the overlay, the photo's
+// Each pixel of a photo of this size is a square of so many pixels in the overlay, the photo's
 // first one in the overlay's top left corner: read_results takes the photo from there.
-int overlay_zoom(int width);
+int overlay_zoom(int width, int height);
 
 }  // namespace vggtcd

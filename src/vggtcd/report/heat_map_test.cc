@@ -61,6 +61,20 @@ TEST(RenderOverlay, PaintsThreeQuartersOfTheHeatOverAQuarterOfTheLight) {
   }
 }
 
+// 360 times a column of a thousand pixels would be two gigabytes with the heat beside it.
+TEST(RenderOverlay, EnlargesThinFramesWithinABound) {
+  for (const int height : {1, 400, 1000, 4096, 20000}) {
+    const std::vector<uint8_t> rgb(3 * static_cast<size_t>(height), 100);
+    const std::vector<float> score(static_cast<size_t>(height), 1.0f);
+    const Image image = render_overlay(rgb, score, height, 1, {1.0, 2.0});
+    const int zoom = overlay_zoom(1, height);
+    EXPECT_GE(zoom, 1);
+    EXPECT_LE(image.rgb.size(), 3u * 724 * (std::max(4096, height) + 34)) << height;
+    EXPECT_EQ(image.width, 2 * zoom + 4);
+  }
+  EXPECT_EQ(overlay_zoom(98, 174), 4);  // photos as they are: by their width
+}
+
 TEST(RenderOverlay, RefusesMismatchedSizes) {
   const std::vector<uint8_t> rgb(12, 100);
   const std::vector<float> score(3, 0.0f);
@@ -77,7 +91,7 @@ TEST(RenderLabelOverlay, ShowsTheAnswersInTheColoursOfThePage) {
   const std::vector<Label> label = {Label::kUnchanged, Label::kRemoved, Label::kAdded,
                                     Label::kUnobserved, Label::kNoEvidence};
   const Image image = render_label_overlay(rgb, label, height, width);
-  const int zoom = overlay_zoom(width), panel = zoom * width;
+  const int zoom = overlay_zoom(width, height), panel = zoom * width;
   ASSERT_EQ(image.width, 2 * panel + 4);
   // 3/4 of viewer/src/colormap.ts kLabelColors and 1/5 of the light; 1/4 of the light alone.
   const double colors[4][3] = {{164, 173, 186}, {213, 94, 0}, {0, 158, 115}, {92, 97, 106}};

@@ -14,6 +14,7 @@
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/ply.h"
 #include "vggtcd/report/heat_map.h"
+#include "vggtcd/report/overlay_names.h"
 
 namespace vggtcd {
 namespace {
@@ -130,7 +131,7 @@ void read_labels(const NpzReader& npz, const std::string& key, ReportEpoch& epoc
 Image read_photo(const fs::path& overlay, int width, int height) {
   if (!fs::exists(overlay)) return {};
   const Image whole = read_image(overlay);
-  const int zoom = overlay_zoom(width);
+  const int zoom = overlay_zoom(width, height);
   if (whole.width < zoom * width || whole.height < zoom * height) {
     throw_error(ErrorCode::kInput,
                 "{}: expected at least {} x {} px for the frames of change.npz, found {} x {}",
@@ -146,10 +147,10 @@ Image read_photo(const fs::path& overlay, int width, int height) {
 }
 
 std::function<Image(int)> photo_reader(const fs::path& overlays, const ReportEpoch& epoch) {
+  std::vector<std::string> names;
+  for (const ReportPhoto& photo : epoch.photos) names.push_back(photo.name);
   std::vector<fs::path> paths;
-  for (const ReportPhoto& photo : epoch.photos) {
-    paths.push_back(overlays / (fs::path(photo.name).stem().string() + ".png"));
-  }
+  for (const std::string& name : overlay_names(names)) paths.push_back(overlays / name);
   return [paths, width = epoch.width, height = epoch.height](int i) {
     return read_photo(paths[static_cast<size_t>(i)], width, height);
   };

@@ -102,13 +102,17 @@ ImageBatch load_photos(std::span<const PhotoRef> photos, const PreprocessOptions
   ProgressStage stage(progress, "photos");
   std::vector<Image> fitted;
   std::vector<std::string> names;
+  PhotoRemarks remarks;
   for (const PhotoRef& photo : photos) {
     throw_if_interrupted();
-    const Image image = load_photo(photo, {options.apply_exif_orientation});
+    PhotoFacts facts;
+    const Image image = load_photo(photo, {options.apply_exif_orientation}, &facts);
+    remarks.add(photo.path.string(), facts);
     fitted.push_back(fit_photo(image, options.mode, photo.path.string()));
     names.push_back(photo.name);
     stage.advance(static_cast<double>(fitted.size()) / static_cast<double>(photos.size()));
   }
+  remarks.report(progress);
   return make_batch(fitted, std::move(names), progress);
 }
 
