@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
 #include "vggtcd/io/heif_image.h"
 #include "vggtcd/io/mapped_file.h"
 
@@ -89,7 +90,8 @@ cv::Mat decode(std::string_view file, int flags) {
   const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<char*>(file.data()));
   try {
     return cv::imdecode(bytes, flags);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;
     return {};
   }
 }
@@ -166,9 +168,11 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
   return rgb_from_bgr(picture);
 }
 
-Image read_image(const std::filesystem::path& path, const ImageReadOptions& options) {
+Image read_image(const std::filesystem::path& path, const ImageReadOptions& options) try {
   const MappedFile file(path);
   return decode_image(file.bytes(), path.string(), options);
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd
