@@ -8,6 +8,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/pipeline/photo_stages.h"
 
 namespace vggtcd::cli {
@@ -38,46 +39,46 @@ void add_detect(Program& program) {
       arguments->photos.after = epochs.after;
       epochs.require_none();
       if (arguments->dry_run) {
-        fmt::print("{}",
-                   describe_plan(arguments->photos, arguments->options, epochs.out, progress));
+        print_answer("{}",
+                     describe_plan(arguments->photos, arguments->options, epochs.out, progress));
         return;
       }
       photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);
-      fmt::print("{}\n", photos.explanation);
+      print_answer("{}\n", photos.explanation);
       inputs = photos.inputs;
       inputs.metric = metric;
     } else {
       inputs = epochs.inputs();
       if (arguments->dry_run) {
-        fmt::print("{}", describe_plan(inputs, arguments->options));
+        print_answer("{}", describe_plan(inputs, arguments->options));
         return;
       }
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
     print_plausibility(outcome.alignment);
-    fmt::print("{}\n", outcome.alignment.explanation);
-    fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
-               percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
-               percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
+    print_answer("{}\n", outcome.alignment.explanation);
+    print_answer("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
+                 percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
+                 percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
     if (outcome.unobserved_t1 + outcome.unobserved_t2 > 0) {
-      fmt::print("Not seen by the other epoch: {:.1f} % before, {:.1f} % after.\n",
-                 percent(outcome.unobserved_t1, outcome.points_t1),
-                 percent(outcome.unobserved_t2, outcome.points_t2));
+      print_answer("Not seen by the other epoch: {:.1f} % before, {:.1f} % after.\n",
+                   percent(outcome.unobserved_t1, outcome.points_t1),
+                   percent(outcome.unobserved_t2, outcome.points_t2));
     }
-    fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
-               outcome.moved);
+    print_answer("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
+                 outcome.moved);
     if (outcome.explanation) {
-      fmt::print("{}\n{}",
-                 explanation_sentence(*outcome.explanation, outcome.metric ? "m" : "scene units"),
-                 explanation_table(*outcome.explanation));
+      print_answer("{}\n{}",
+                   explanation_sentence(*outcome.explanation, outcome.metric ? "m" : "scene units"),
+                   explanation_table(*outcome.explanation));
     }
-    fmt::print("{}\n", outcome.metric ? metric_sentence(*outcome.metric)
-                                      : "Lengths are in scene units; --known-distance or "
-                                        "--reference gives metres.");
-    fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
-               arguments->options.page ? epochs.out + "/report.html, " : "",
-               arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
-               epochs.out);
+    print_answer("{}\n", outcome.metric ? metric_sentence(*outcome.metric)
+                                        : "Lengths are in scene units; --known-distance or "
+                                          "--reference gives metres.");
+    print_answer("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
+                 arguments->options.page ? epochs.out + "/report.html, " : "",
+                 arguments->options.overlays ? epochs.out + "/overlays, " : "", epochs.out,
+                 epochs.out);
   };
   CLI::App* command =
       add_command(program, program.app, "detect",
