@@ -75,8 +75,8 @@ class Streams(Surroundings):
         self.assertEqual(run("detect", *KITCHEN, "-o", self.root / "normal").returncode, 0)
         for numbers in ((2,), (1,), (0, 1, 2)):
             out = self.root / f"closed{len(numbers)}{numbers[0]}"
-            done = run("detect", *KITCHEN, "-o", out, prepare=self.closed(*numbers), stdout=None, stderr=None,
-                       stdin=None)
+            done = run("detect", *KITCHEN, "-o", out, prepare=self.closed(*numbers), stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
             self.assertEqual(done.returncode, 0)
             self.assertEqual(self.content(out), self.content(self.root / "normal"))
 
@@ -189,11 +189,11 @@ class Files(Surroundings):
                                       (WEIGHTS, ["weights", "info", file]),
                                       (WEIGHTS, ["detect", self.root / "photos", self.root / "others", "--weights", file,
                                                  *out])):
-                line = self.line(run(*arguments), status)
+                line = self.line(run(*arguments, "--progress", "none"), status)
                 self.assertIn(f"{file}: expected ", line)
                 self.assertIn("a pipe or a device, no ordinary file", line)
         for name in ("pipe.jpg", "pipe.npz", "pipe.mp4"):
-            line = self.line(run("detect", self.root / name, self.root / "photos", *out), INPUT)
+            line = self.line(run("detect", self.root / name, self.root / "photos", *out, "--progress", "none"), INPUT)
             self.assertIn(name, line)
         self.assertFalse((self.root / "out").exists())
 
@@ -233,7 +233,7 @@ class Files(Surroundings):
             os.chdir(gone)
             gone.rmdir()
 
-        done = run("detect", *KITCHEN, "-o", "out", prepare=leave)
+        done = run("detect", *KITCHEN, "-o", "out", "--progress", "none", prepare=leave)
         self.assertIn("out: cannot be written", self.line(done, OUTPUT))
         gone.mkdir()
         done = run("detect", *KITCHEN, "-o", self.root / "absolute", "--progress", "json", prepare=leave)

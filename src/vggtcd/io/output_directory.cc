@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 fs::path resolve(const fs::path& target) {
   std::error_code error;
   if (target.empty()) fail(target, "no directory given");
-  fs::path resolved = fs::weakly_canonical(fs::absolute(target, error), error);
+  fs::path resolved = fs::absolute(target, error);
+  if (!error) resolved = fs::weakly_canonical(resolved, error);
   if (error) fail(target, error.message());
   if (!resolved.has_filename()) resolved = resolved.parent_path();
   if (resolved == resolved.root_path() || resolved == fs::current_path(error)) {
