@@ -27,9 +27,31 @@ int fail(ErrorCode code, std::string_view what) noexcept {
   return static_cast<int>(code);
 }
 
+// OpenBLAS, which comes with OpenCV and is not used, starts threads while it is loaded, each with
+// 128 MB; where they cannot be had it ends the process or takes the memory that others need. It
+// obeys a variable, so this runs before any library does: in the place of "_", which only shells
+// care about.
+char g_no_blas_threads[] = "OPENBLAS_NUM_THREADS=1";
+constexpr std::string_view kBlasVariable = "OPENBLAS_NUM_THREADS";
+
+void forbid_blas_threads(int, char**, char** environment) {
+  char** place = nullptr;
+  for (char** entry = environment; *entry != nullptr; ++entry) {
+    const std::string_view variable(*entry);
+    if (variable.starts_with(kBlasVariable)) return;  // the user knows better
+    if (variable.starts_with("_=")) place = entry;
+  }
+  if (place != nullptr) *place = g_no_blas_threads;
+}
+[[gnu::section(".preinit_array"),
+  gnu::used]] void (*const g_before_libraries)(int, char**, char**) = forbid_blas_threads;
+
 // What the surroundings may do to a process is an error that is told, not the end of it.
 void prepare_process() {
   open_closed_streams();
+  // It was for us, not for programs that we start.
+  const char* blas = std::getenv(kBlasVariable.data());
+  if (blas == g_no_blas_threads + kBlasVariable.size() + 1) unsetenv(kBlasVariable.data());
   std::signal(SIGPIPE, SIG_IGN);  // the write fails instead, and what was begun is cleaned up
   // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which
   // adds up to a tenth of the peak.
