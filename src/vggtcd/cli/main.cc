@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <exception>
 #include <opencv2/core/utility.hpp>
 #include <sstream>
 
@@ -46,9 +47,22 @@ void forbid_blas_threads(int, char**, char** environment) {
 [[gnu::section(".preinit_array"),
   gnu::used]] void (*const g_before_libraries)(int, char**, char**) = forbid_blas_threads;
 
+// An exception in a destructor, OpenCV's where memory is short: no way back, but still one line.
+[[noreturn]] void on_terminate() {
+  int status = static_cast<int>(ErrorCode::kMemory);
+  try {
+    const Error error = failure_in_flight();
+    status = fail(error.code(), error.what());
+  } catch (...) {
+    fail(ErrorCode::kMemory, kOutOfMemory);
+  }
+  std::_Exit(status);
+}
+
 // What the surroundings may do to a process is an error that is told, not the end of it.
 void prepare_process() {
   open_closed_streams();
+  std::set_terminate(on_terminate);
   // It was for us, not for programs that we start.
   const char* blas = std::getenv(kBlasVariable.data());
   if (blas == g_no_blas_threads + kBlasVariable.size() + 1) unsetenv(kBlasVariable.data());

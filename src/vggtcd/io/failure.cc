@@ -43,7 +43,9 @@ Error error_naming(const std::filesystem::path* file) {
   } catch (const std::bad_alloc&) {
     return out_of_memory();
   } catch (const cv::Exception& error) {
-    return error.code == cv::Error::StsNoMem ? out_of_memory() : internal(error.what());
+    // OpenCV 4.6 asserts when it frees a buffer that it could not allocate.
+    const bool of_memory = error.code == cv::Error::StsNoMem || error.func == "cleanup";
+    return of_memory ? out_of_memory() : internal(error.what());
   } catch (const std::system_error& error) {
     return error.code() == std::errc::not_enough_memory ? out_of_memory() : internal(error.what());
   } catch (const std::exception& error) {
