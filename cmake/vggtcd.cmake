@@ -47,7 +47,12 @@ function(vggtcd_module room)
           FILES_MATCHING PATTERN "*.h" ${internal})
 endfunction()
 
-# vggtcd_test(NAME SOURCES a_test.cc ... [DEPS ...] [LABELS unit] [TIMEOUT 60])
+# Time limits of tests, in seconds. They are for hangs: an order above what a slow laptop takes while it does other things.
+set(VGGTCD_LIMIT_UNIT 1800)
+set(VGGTCD_LIMIT_E2E 10800)
+set(VGGTCD_LIMIT_WEIGHTS 21600)
+
+# vggtcd_test(NAME SOURCES a_test.cc ... [DEPS ...] [LABELS unit] [TIMEOUT ${VGGTCD_LIMIT_UNIT}])
 # One GoogleTest program; every TEST in it becomes a ctest test of that label.
 # The tests see VGGTCD_SOURCE_DIR, the root of the checkout, for golden data.
 # The target unit_tests builds those labelled unit and nothing else.
@@ -60,7 +65,7 @@ function(vggtcd_test name)
     set(arg_LABELS unit)
   endif()
   if(NOT arg_TIMEOUT)
-    set(arg_TIMEOUT 300)
+    set(arg_TIMEOUT ${VGGTCD_LIMIT_UNIT})
   endif()
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${CMAKE_SOURCE_DIR}/src ${CMAKE_SOURCE_DIR})

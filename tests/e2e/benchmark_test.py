@@ -16,6 +16,8 @@ import unittest
 
 import numpy as np
 
+from running import HANG_S
+
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
 RECIPE_WEIGHTS = pathlib.Path(sys.argv.pop(1)).resolve()
 USAGE = 2  # exit status, docs/formats.md
@@ -23,7 +25,7 @@ USAGE = 2  # exit status, docs/formats.md
 
 def run(*arguments):
     return subprocess.run([PROGRAM, *map(str, arguments), "--progress", "none"], capture_output=True, text=True,
-                          timeout=500)
+                          timeout=HANG_S)
 
 
 def registration(out):

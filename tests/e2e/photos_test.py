@@ -17,13 +17,15 @@ import unittest
 
 import numpy as np
 
+from running import HANG_S
+
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
 TEST_MEDIA = pathlib.Path(sys.argv.pop(1)).resolve()
 
 
 def run(*arguments, **kwargs):
     environment = {**os.environ, "VGGTCD_WEIGHTS": "", "HOME": "/nonexistent", **kwargs.pop("env", {})}
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=500,
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S,
                           env=environment, **kwargs)
 
 

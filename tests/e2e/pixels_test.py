@@ -4,7 +4,6 @@
 
 Usage: pixels_test.py PROGRAM TEST_MEDIA [unittest arguments]
 """
-import fcntl
 import json
 import os
 import pathlib
@@ -18,6 +17,8 @@ import unittest
 
 import numpy as np
 
+from running import HANG_S, signal_at
+
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
 TEST_MEDIA = pathlib.Path(sys.argv.pop(1)).resolve()
 ENVIRONMENT = {**os.environ, "VGGTCD_WEIGHTS": "", "HOME": "/nonexistent"}
@@ -25,7 +26,7 @@ SIZE = ("--frame-side", "168")
 
 
 def run(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=500,
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S,
                           env=ENVIRONMENT)
 
 
@@ -56,24 +57,7 @@ def content(out):
 
 
 def kill_at(arguments, wanted):
-    """Runs with --progress json and kills at the first event that is wanted; the events until then, and the status.
-
-    The events come through a pipe that holds one of them (a packet pipe of one page): the program waits in
-    the second event after the last one read here, so it cannot end before the kill, however fast it is.
-    """
-    events_in, events_out = os.pipe2(os.O_DIRECT | os.O_CLOEXEC)
-    fcntl.fcntl(events_out, fcntl.F_SETPIPE_SZ, 4096)
-    process = subprocess.Popen([*map(str, [PROGRAM, *arguments]), "--progress", "json"], stderr=events_out,
-                               stdout=subprocess.DEVNULL, env=ENVIRONMENT)
-    os.close(events_out)
-    events = []
-    with open(events_in, "rb") as lines:
-        for line in lines:
-            events.append(json.loads(line))
-            if wanted(events[-1]):
-                process.send_signal(signal.SIGKILL)
-                break
-        status = process.wait(timeout=100)  # before the pipe is closed: SIGPIPE would end it, too
+    events, _, status = signal_at([PROGRAM, *arguments], wanted, signal.SIGKILL, ENVIRONMENT)
     return events, status
 
 
@@ -162,7 +146,7 @@ class Pixels(unittest.TestCase):
         except OSError:  # Linux: the other end is closed
             pass
         os.close(ours)
-        self.assertEqual(process.wait(timeout=100), 0)
+        self.assertEqual(process.wait(timeout=HANG_S), 0)
         self.assertIn(b"; about ", shown)
         self.assertIn(b" s to go", shown)
         live = [line for line in shown.replace(b"\n", b"\r").split(b"\r") if line.startswith(b"\x1b[K")]

@@ -18,6 +18,8 @@ import unittest
 
 import numpy as np
 
+from running import HANG_S, signal_at
+
 PROGRAM = pathlib.Path(sys.argv.pop(1)).resolve()
 RECIPE_WEIGHTS = pathlib.Path(sys.argv.pop(1)).resolve()
 GOLDEN = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -27,7 +29,7 @@ INPUT, WEIGHTS, OUTPUT, USAGE = 3, 4, 6, 2  # exit statuses, docs/formats.md
 
 
 def run(*arguments):
-    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=HANG_S)
 
 
 class WithTinyNetwork(unittest.TestCase):
@@ -154,14 +156,10 @@ class Reconstruct(WithTinyNetwork):
         before = sorted(self.root.rglob("*"))
         arguments = [PROGRAM, "reconstruct", *[PHOTOS / "01_rgb_640x480.png"] * 12, "-o", self.root / "x.npz",
                      "--weights", self.weights, "--threads", "1"]
-        process = subprocess.Popen(list(map(str, arguments)), stderr=subprocess.PIPE, text=True)
-        for line in process.stderr:  # the plan is printed right before the network starts
-            if "GB of memory" in line:
-                break
-        process.send_signal(signal.SIGINT)
-        self.assertEqual(process.wait(timeout=120), 130)
-        self.assertIn("interrupted", process.stderr.read())
-        process.stderr.close()
+        # The plan is told right before the network starts.
+        _, others, status = signal_at(
+            arguments, lambda e: e["event"] == "notice" and "GB of memory" in e["message"], signal.SIGINT)
+        self.assertEqual((status, others), (130, ["vggt-cd: interrupted\n"]))
         self.assertEqual(sorted(self.root.rglob("*")), before)
 
 

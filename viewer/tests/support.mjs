@@ -40,10 +40,14 @@ export function writePage(html) {
   return file;
 }
 
+// Only a hang takes so long, on whatever machine and however loaded.
+const HANG_MS = 1800_000;
+
 // Opens a report and waits until it is drawn. `troubles` collects whatever must not happen: errors and
 // warnings of the console, dialogs, and requests to anywhere.
 export async function open(browser, file, { width = 900, height = 600, ready = 'true', ...options } = {}) {
   const context = await browser.newContext({ viewport: { width, height }, offline: true, ...options });
+  context.setDefaultTimeout(HANG_MS);
   const page = await context.newPage();
   const troubles = [];
   page.on('console', (message) => {
@@ -58,7 +62,7 @@ export async function open(browser, file, { width = 900, height = 600, ready = '
   });
   page.on('dialog', (dialog) => { troubles.push(`dialog: ${dialog.message()}`); void dialog.dismiss(); });
   await page.goto(pathToFileURL(file).href);
-  await page.waitForFunction((value) => document.documentElement.dataset.ready === value, ready, { timeout: 120000 });
+  await page.waitForFunction((value) => document.documentElement.dataset.ready === value, ready);
   return { page, troubles, close: () => context.close() };
 }
 

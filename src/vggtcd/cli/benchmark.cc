@@ -7,8 +7,10 @@
 #include <algorithm>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/evaluation/benchmark_report.h"
 #include "vggtcd/evaluation/wat.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/photo_source.h"
 #include "vggtcd/pipeline/predict_epochs.h"
 
@@ -63,7 +65,7 @@ WatPredictions wat_predictions(const Arguments& arguments, ProgressSink& progres
   const fs::path directory = fs::path(arguments.out) / "predictions";
   return {
       directory,
-      fmt::format("{}; at most {} photos; precision {}", fs::absolute(arguments.weights).string(),
+      fmt::format("{}; at most {} photos; precision {}", absolute_path(arguments.weights).string(),
                   arguments.max_photos, enum_to_string(arguments.precision)),
       [&arguments, directory, &progress](const std::string& scene) {
         predict_scene(arguments, directory, scene, progress);
@@ -86,7 +88,7 @@ void run(const Arguments& arguments, ProgressSink& progress) {
     scenes = run_wat_suite(arguments.out, arguments.data, wat_predictions(arguments, progress),
                            arguments.options, progress);
   }
-  fmt::print("{}", report_markdown({arguments.suite, arguments.options, scenes}));
+  print_answer("{}", report_markdown({arguments.suite, arguments.options, scenes}));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/photo_stages.h"
 
@@ -45,46 +46,46 @@ void add_detect(Program& program) {
       arguments->photos.after = epochs.after;
       epochs.require_none();
       if (arguments->dry_run) {
-        fmt::print("{}",
-                   describe_plan(arguments->photos, arguments->options, epochs.out, progress));
+        print_answer("{}",
+                     describe_plan(arguments->photos, arguments->options, epochs.out, progress));
         return;
       }
       photos = reconstruct_photos(arguments->photos, arguments->options, epochs.out, progress);
-      fmt::print("{}\n", escaped(photos.explanation));
+      print_answer("{}\n", escaped(photos.explanation));
       inputs = photos.inputs;
       inputs.metric = metric;
     } else {
       inputs = epochs.inputs();
       if (arguments->dry_run) {
-        fmt::print("{}", describe_plan(inputs, arguments->options));
+        print_answer("{}", describe_plan(inputs, arguments->options));
         return;
       }
     }
     const DetectOutcome outcome = detect(inputs, arguments->options, epochs.out, progress);
     print_plausibility(outcome.alignment);
-    fmt::print("{}\n", escaped(outcome.alignment.explanation));
-    fmt::print("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
-               percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
-               percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
+    print_answer("{}\n", escaped(outcome.alignment.explanation));
+    print_answer("Changed: {:.1f} % of {} points before, {:.1f} % of {} points after.\n",
+                 percent(outcome.changed_t1, outcome.points_t1), outcome.points_t1,
+                 percent(outcome.changed_t2, outcome.points_t2), outcome.points_t2);
     if (outcome.unobserved_t1 + outcome.unobserved_t2 > 0) {
-      fmt::print("Not seen by the other epoch: {:.1f} % before, {:.1f} % after.\n",
-                 percent(outcome.unobserved_t1, outcome.points_t1),
-                 percent(outcome.unobserved_t2, outcome.points_t2));
+      print_answer("Not seen by the other epoch: {:.1f} % before, {:.1f} % after.\n",
+                   percent(outcome.unobserved_t1, outcome.points_t1),
+                   percent(outcome.unobserved_t2, outcome.points_t2));
     }
-    fmt::print("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
-               outcome.moved);
+    print_answer("Things: {} removed, {} added, {} moved.\n", outcome.removed, outcome.added,
+                 outcome.moved);
     if (outcome.explanation) {
       const PixelExplanation why = with_escaped_names(*outcome.explanation);
-      fmt::print("{}\n{}", explanation_sentence(why, outcome.metric ? "m" : "scene units"),
-                 explanation_table(why));
+      print_answer("{}\n{}", explanation_sentence(why, outcome.metric ? "m" : "scene units"),
+                   explanation_table(why));
     }
-    fmt::print("{}\n", outcome.metric ? escaped(metric_sentence(*outcome.metric))
-                                      : "Lengths are in scene units; --known-distance or "
-                                        "--reference gives metres.");
+    print_answer("{}\n", outcome.metric ? escaped(metric_sentence(*outcome.metric))
+                                        : "Lengths are in scene units; --known-distance or "
+                                          "--reference gives metres.");
     const std::string out = escaped(epochs.out);
-    fmt::print("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
-               arguments->options.page ? out + "/report.html, " : "",
-               arguments->options.overlays ? out + "/overlays, " : "", out, out);
+    print_answer("Look at {}{}{}/before_aligned.ply and {}/after.ply.\n",
+                 arguments->options.page ? out + "/report.html, " : "",
+                 arguments->options.overlays ? out + "/overlays, " : "", out, out);
   };
   CLI::App* command =
       add_command(program, program.app, "detect",

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/number_text.h"
 
 namespace vggtcd::cli {
@@ -83,7 +84,7 @@ MetricInputs EpochArguments::metric() const {
 void print_plausibility(const Alignment& alignment) {
   const PlausibilityResult& plausibility = alignment.plausibility;
   if (plausibility.verdict == Plausibility::kBelievable) return;
-  fmt::print("Careful: {}.\n", plausibility.explanation);
+  print_answer("Careful: {}.\n", plausibility.explanation);
 }
 
 void EpochArguments::require_none() const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/evaluation/results_scores.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/sim3_file.h"
@@ -91,7 +92,7 @@ void run_change(const Arguments& arguments) {
                 "scene, and nothing else");
   }
   const ResultsScores s = score_results(arguments.change, arguments.truth);
-  fmt::print(
+  print_answer(
       "photos placed             {:>5} of {} before, {} of {} after\n"
       "ATE mean                  {:>12.6g} m\n"
       "pixels with evidence      {:>11.1f} %\n"
@@ -134,7 +135,7 @@ void run(const Arguments& arguments) {
   const std::vector<Rigid3> after = read_poses(arguments.after, arguments.poses);
   const TrajectoryErrors e =
       evaluate_trajectory(register_trajectory(before, after, t2_from_t1), read_truth(arguments));
-  fmt::print(
+  print_answer(
       "frames                    {:>12}\n"
       "ATE mean                  {:>12.6g}\n"
       "ATE RMSE                  {:>12.6g}\n"

@@ -4,23 +4,85 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
-#include <new>
+#include <cstdlib>
+#include <exception>
+#include <opencv2/core/utility.hpp>
+#include <sstream>
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/manual_page.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/cli/terminal_progress.h"
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/version.h"
-#include "vggtcd/io/quote.h"
+#include "vggtcd/io/failure.h"
 
 namespace vggtcd::cli {
 namespace {
 
-int fail(ErrorCode code, std::string_view what) {
-  fmt::print(stderr, "vggt-cd: {}\n", escaped(what));  // one line, whatever a name holds
+int fail(ErrorCode code, std::string_view what) noexcept {
+  tell("vggt-cd: ", what);
   return static_cast<int>(code);
+}
+
+// OpenBLAS, which comes with OpenCV and is not used, starts threads while it is loaded, each with
+// 128 MB; where they cannot be had it ends the process or takes the memory that others need. It
+// obeys a variable, so this runs before any library does: in the place of "_", which only shells
+// care about.
+char g_no_blas_threads[] = "OPENBLAS_NUM_THREADS=1";
+constexpr std::string_view kBlasVariable = "OPENBLAS_NUM_THREADS";
+
+void forbid_blas_threads(int, char**, char** environment) {
+  char** place = nullptr;
+  for (char** entry = environment; *entry != nullptr; ++entry) {
+    const std::string_view variable(*entry);
+    if (variable.starts_with(kBlasVariable)) return;  // the user knows better
+    if (variable.starts_with("_=")) place = entry;
+  }
+  if (place != nullptr) *place = g_no_blas_threads;
+}
+[[gnu::section(".preinit_array"),
+  gnu::used]] void (*const g_before_libraries)(int, char**, char**) = forbid_blas_threads;
+
+// An exception in a destructor, OpenCV's where memory is short: no way back, but still one line.
+[[noreturn]] void on_terminate() {
+  int status = static_cast<int>(ErrorCode::kMemory);
+  try {
+    const Error error = failure_in_flight();
+    status = fail(error.code(), error.what());
+  } catch (...) {
+    fail(ErrorCode::kMemory, kOutOfMemory);
+  }
+  std::_Exit(status);
+}
+
+// What the surroundings may do to a process is an error that is told, not the end of it.
+void prepare_process() {
+  open_closed_streams();
+  std::set_terminate(on_terminate);
+  // It was for us, not for programs that we start.
+  const char* blas = std::getenv(kBlasVariable.data());
+  if (blas == g_no_blas_threads + kBlasVariable.size() + 1) unsetenv(kBlasVariable.data());
+  std::signal(SIGPIPE, SIG_IGN);  // the write fails instead, and what was begun is cleaned up
+  // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which
+  // adds up to a tenth of the peak.
+  mallopt(M_MMAP_THRESHOLD, 4 << 20);
+  reserve_memory_for_failures();
+}
+
+// The threads of this program are those of core/parallel.h.
+void start_work_threads(int wanted, ProgressSink& progress) {
+  if (wanted > 0) set_num_threads(wanted);
+  cv::setNumThreads(1);
+  const int asked = num_threads();
+  const int given = start_threads();
+  if (given == asked) return;
+  progress.notice(fmt::format(
+      "the system does not give {} threads (a limit on processes or on memory); going on with {}",
+      asked, given));
 }
 
 // The library names options by their fields ("min_votes: expected ..."); users know the flag.
@@ -59,38 +121,47 @@ int run(int argc, char** argv) {
   try {
     program.app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return program.app.exit(error);  // --help, --version
+    if (error.get_exit_code() == 0) {  // --help, --version
+      std::ostringstream text;
+      program.app.exit(error, text, text);
+      write_answer(text.str());
+      finish_answer();
+      return 0;
+    }
     return fail(ErrorCode::kUsage, error.what() + std::string(" (try --help)"));
   }
-  if (program.common.threads > 0) set_num_threads(program.common.threads);
   install_interrupt_handler();
   const std::unique_ptr<ProgressSink> progress = make_progress(program.common.progress);
+  start_work_threads(program.common.threads, *progress);
   try {
     program.action(*progress);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kUsage) throw;
     return fail(error.code(), with_flag(error.what(), *program.app.get_subcommands().front()));
   }
+  finish_answer();
   return 0;
+}
+
+int run_or_fail(int argc, char** argv) noexcept try {
+  try {
+    return run(argc, argv);
+  } catch (...) {
+    const Error error = failure_in_flight();
+    return fail(error.code(), error.what());
+  }
+} catch (...) {  // not even memory for the sentence
+  return fail(ErrorCode::kMemory, kOutOfMemory);
 }
 
 }  // namespace
 }  // namespace vggtcd::cli
 
 int main(int argc, char** argv) {
-  // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which
-  // adds up to a tenth of the peak.
-  mallopt(M_MMAP_THRESHOLD, 4 << 20);
-  using vggtcd::Error;
-  using vggtcd::ErrorCode;
-  try {
-    return vggtcd::cli::run(argc, argv);
-  } catch (const Error& error) {
-    return vggtcd::cli::fail(error.code(), error.what());
-  } catch (const std::bad_alloc&) {
-    return vggtcd::cli::fail(ErrorCode::kMemory, "out of memory; use fewer or smaller photos");
-  } catch (const std::exception& error) {
-    return vggtcd::cli::fail(ErrorCode::kInternal,
-                             fmt::format("internal error: {}; please report it", error.what()));
-  }
+  vggtcd::cli::prepare_process();
+  const int status = vggtcd::cli::run_or_fail(argc, argv);
+  // Without the shut-down of libraries: where memory is short, OpenBLAS (of OpenCV) waits there for
+  // ever for a thread that waits for memory.
+  std::fflush(nullptr);
+  std::_Exit(status);
 }

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/photo_source.h"
@@ -66,8 +67,8 @@ void reconstruct(const Arguments& arguments, ProgressSink& progress) {
     const ProgressStage stage(progress, "write");
     write_prediction(arguments.output, images, prediction);
   }
-  fmt::print("{}: {} frames of {} x {} px\n", escaped(arguments.output.string()), images.frames,
-             images.width, images.height);
+  print_answer("{}: {} frames of {} x {} px\n", escaped(arguments.output.string()), images.frames,
+               images.width, images.height);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/epoch_arguments.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/io/photo_source.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/detect.h"
@@ -34,10 +35,10 @@ void add_register(Program& program) {
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);
         print_plausibility(alignment);
-        fmt::print("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n",
-                   escaped(alignment.explanation), escaped(arguments->epochs.out),
-                   alignment.t2_from_t1.scale);
-        if (metric) fmt::print("{}\n", escaped(metric_sentence(*metric)));
+        print_answer("{}\n{}/sim3.json has the similarity, scale {:.6g}.\n",
+                     escaped(alignment.explanation), escaped(arguments->epochs.out),
+                     alignment.t2_from_t1.scale);
+        if (metric) print_answer("{}\n", escaped(metric_sentence(*metric)));
       });
   arguments->epochs.add_to(command);
   add_fields(command, arguments->options, "Alignment");

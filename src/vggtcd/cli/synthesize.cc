@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
 #include "vggtcd/io/quote.h"
 
@@ -17,14 +18,14 @@ struct Arguments {
 
 void run(const Arguments& arguments, ProgressSink& progress) {
   if (arguments.list) {
-    for (const std::string_view name : all_scene_names()) fmt::print("{}\n", name);
+    for (const std::string_view name : all_scene_names()) print_answer("{}\n", name);
     return;
   }
   if (arguments.directory.empty()) {
     throw_error(ErrorCode::kUsage, "OUT: expected a new directory to write to, found none");
   }
   synthesize(arguments.directory, arguments.options, progress);
-  fmt::print(
+  print_answer(
       "{}: before/ after/ (photos), t1.npz t2.npz joint.npz (predictions), truth.npz "
       "truth.json\n",
       escaped(arguments.directory));

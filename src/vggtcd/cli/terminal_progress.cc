@@ -7,14 +7,13 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/job_clock.h"
 #include "vggtcd/core/timer.h"
-#include "vggtcd/io/quote.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -37,9 +36,7 @@ class NoticesOnly : public ProgressSink {
   void stage_started(std::string_view) override {}
   void stage_advanced(std::string_view, double) override {}
   void stage_finished(std::string_view, double) override {}
-  void notice(std::string_view message) override {
-    fmt::print(stderr, "note: {}\n", escaped(message));
-  }
+  void notice(std::string_view message) override { tell("note: ", message); }
 };
 
 // What the displays share: the clock of stage and job.
@@ -85,9 +82,7 @@ class TimedProgress : public ProgressSink {
 
 class PlainLines : public TimedProgress {
  public:
-  void notice(std::string_view message) override {
-    fmt::print(stderr, "note: {}\n", escaped(message));
-  }
+  void notice(std::string_view message) override { tell("note: ", message); }
 
  protected:
   void show_started(std::string_view) override { shown_s_ = monotonic_seconds(); }
@@ -96,13 +91,12 @@ class PlainLines : public TimedProgress {
     const double now = monotonic_seconds();
     if (now - shown_s_ < kEverySeconds || fraction <= 0 || fraction >= 1) return;
     shown_s_ = now;
-    fmt::print(stderr, "{}: {:.0f} %{}{}\n", stage, 100 * fraction, stage_left_text(),
-               job_left_text());
+    tell(stage, fmt::format(": {:.0f} %{}{}", 100 * fraction, stage_left_text(), job_left_text()));
   }
   void show_finished(std::string_view stage, double seconds) override {
     constexpr double kWorthSayingS = 3;
     const bool is_long = job_seconds_left().value_or(0) >= kWorthSayingS;
-    fmt::print(stderr, "{}: {}{}\n", stage, duration_text(seconds), is_long ? job_left_text() : "");
+    tell(stage, fmt::format(": {}{}", duration_text(seconds), is_long ? job_left_text() : ""));
   }
 
  private:
@@ -114,7 +108,7 @@ class LiveLine : public TimedProgress {
   ~LiveLine() override { erase(); }
   void notice(std::string_view message) override {
     erase();
-    fmt::print(stderr, "note: {}\n", escaped(message));
+    tell("note: ", message);
   }
 
  protected:
@@ -132,7 +126,7 @@ class LiveLine : public TimedProgress {
   }
   void show_finished(std::string_view stage, double seconds) override {
     erase();
-    fmt::print(stderr, "{}: {}\n", stage, duration_text(seconds));
+    tell(stage, ": " + duration_text(seconds));
   }
 
  private:
@@ -143,13 +137,12 @@ class LiveLine : public TimedProgress {
     return size.ws_col;
   }
   void draw(const std::string& line) {
-    fmt::print(stderr, "\r\x1b[K{}", line.substr(0, terminal_columns() - 1));
-    std::fflush(stderr);
+    tell_raw("\r\x1b[K" + line.substr(0, terminal_columns() - 1));
     drawn_s_ = monotonic_seconds();
     drawn_ = true;
   }
   void erase() {
-    if (drawn_) fmt::print(stderr, "\r\x1b[K");
+    if (drawn_) tell_raw("\r\x1b[K");
     drawn_ = false;
   }
   double drawn_s_ = 0;
@@ -187,7 +180,7 @@ class JsonLines : public TimedProgress {
       line["job_seconds_left"] = *left;
     }
     constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
-    fmt::print(stderr, "{}\n", line.dump(-1, ' ', false, kReplace));
+    tell("", line.dump(-1, ' ', false, kReplace));
   }
 };
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/report/read_results.h"
 #include "vggtcd/report/report_page.h"
@@ -33,8 +34,8 @@ void add_view(Program& program) {
           stage.advance(0.5);
           size = write_report(input, arguments->options, page);
         }
-        fmt::print("{}: {:.1f} MB, {} of {} points.\n", escaped(page.string()),
-                   static_cast<double>(size.bytes) * 1e-6, size.points_shown, size.points);
+        print_answer("{}: {:.1f} MB, {} of {} points.\n", escaped(page.string()),
+                     static_cast<double>(size.bytes) * 1e-6, size.points_shown, size.points);
       });
   command->add_option("results", arguments->results, "Directory that vggt-cd detect wrote")
       ->required();

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/vggt/checkpoint.h"
@@ -17,13 +18,13 @@ namespace {
 // The first few of a list that may be long.
 void print_list(const char* title, const std::vector<std::string>& names) {
   constexpr size_t kShown = 8;
-  if (names.empty()) return fmt::print("{:<13}none\n", title);
-  fmt::print("{:<13}{} tensors\n", title, names.size());
+  if (names.empty()) return print_answer("{:<13}none\n", title);
+  print_answer("{:<13}{} tensors\n", title, names.size());
   for (size_t i = 0; i < std::min(kShown, names.size()); ++i) {
     const std::string quoted = quote(names[i]);
-    fmt::print("               {}\n", quoted.substr(1, quoted.size() - 2));
+    print_answer("               {}\n", quoted.substr(1, quoted.size() - 2));
   }
-  if (names.size() > kShown) fmt::print("               and {} more\n", names.size() - kShown);
+  if (names.size() > kShown) print_answer("               and {} more\n", names.size() - kShown);
 }
 
 void print_precision(const WeightFile& file) {
@@ -34,8 +35,8 @@ void print_precision(const WeightFile& file) {
     all += tensor.numel();
     bytes += static_cast<int64_t>(tensor.data.size());
   }
-  fmt::print("{:<13}{}, {:.2f} million values, {:.3f} GB\n", "tensors", file.tensors.size(),
-             static_cast<double>(all) / 1e6, static_cast<double>(bytes) / 1e9);
+  print_answer("{:<13}{}, {:.2f} million values, {:.3f} GB\n", "tensors", file.tensors.size(),
+               static_cast<double>(all) / 1e6, static_cast<double>(bytes) / 1e9);
   std::string text;
   for (const auto& [dtype, count] : values) {
     if (!text.empty()) text += ", ";
@@ -43,25 +44,26 @@ void print_precision(const WeightFile& file) {
         100 * static_cast<double>(count) / static_cast<double>(std::max<int64_t>(all, 1));
     text += fmt::format("{} {:.4g} %", dtype, share);
   }
-  fmt::print("{:<13}{}\n", "precision", text);
+  print_answer("{:<13}{}\n", "precision", text);
 }
 
 void print_network(const CheckpointReport& report, bool has_config) {
   const NetworkSizes& s = report.sizes;
-  fmt::print("{:<13}VGGT: {} frame and {} global blocks of width {}, patch embedder of {} blocks\n",
-             "network", s.depth, s.depth, s.embed_dim, s.vit_depth);
-  fmt::print("{:<13}{}\n", "config",
-             has_config ? "in the file" : "not in the file: heads and layers as in VGGT-1B");
+  print_answer(
+      "{:<13}VGGT: {} frame and {} global blocks of width {}, patch embedder of {} blocks\n",
+      "network", s.depth, s.depth, s.embed_dim, s.vit_depth);
+  print_answer("{:<13}{}\n", "config",
+               has_config ? "in the file" : "not in the file: heads and layers as in VGGT-1B");
   for (const CheckpointReport::Module& module : report.modules) {
     const std::string state = module.present == module.expected ? "complete"
                               : module.present == 0             ? "absent"
                                                                 : "incomplete";
-    fmt::print("  {:<13}{}, {} of {} tensors, {:.2f} million values\n", module.name, state,
-               module.present, module.expected, static_cast<double>(module.values) / 1e6);
+    print_answer("  {:<13}{}, {} of {} tensors, {:.2f} million values\n", module.name, state,
+                 module.present, module.expected, static_cast<double>(module.values) / 1e6);
   }
   if (report.track_head_tensors > 0) {
-    fmt::print("  {:<13}{} tensors, not used by this program\n", "track_head",
-               report.track_head_tensors);
+    print_answer("  {:<13}{} tensors, not used by this program\n", "track_head",
+                 report.track_head_tensors);
   }
   print_list("missing", report.missing);
   print_list("misshapen", report.misshapen);
@@ -83,8 +85,8 @@ void add_info(Program& program, CLI::App& parent) {
   CLI::App* command = add_command(
       program, parent, "info", "Show what a weights file holds.", [path](ProgressSink&) {
         const WeightFile file = open_weight_file(*path);
-        fmt::print("{:<13}{}\n", "file", escaped(*path));
-        fmt::print("{:<13}{}\n", "format", weight_format_name(file.format));
+         print_answer("{:<13}{}\n", "file", escaped(*path));
+         print_answer("{:<13}{}\n", "format", weight_format_name(file.format));
         print_precision(file);
         const CheckpointReport report = inspect_checkpoint(file, *path);
         print_network(report, file.metadata.contains("config"));
@@ -108,7 +110,7 @@ void add_convert(Program& program, CLI::App& parent) {
       program, parent, "convert", "Write a weights file as safetensors of another precision.",
       [arguments](ProgressSink& progress) {
         convert_weights(arguments->from, arguments->to, arguments->options, progress);
-        fmt::print("{}\n", escaped(arguments->to));
+         print_answer("{}\n", escaped(arguments->to));
       });
   command->add_option("FILE", arguments->from, "A .safetensors or .pt file.")->required();
   command->add_option("-o,--out,--output", arguments->to, "The .safetensors file to write.")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A plain pool of std::threads: what parallel_for needs and no more (visible to ThreadSanitizer,
-// unlike libgomp).
+// unlike libgomp). The system may give fewer threads than were asked for; the work goes on then.
 #include "vggtcd/core/parallel.h"
 
 #include <sched.h>
@@ -11,6 +11,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -52,21 +53,17 @@ struct Job {
 
 class Pool {
  public:
-  explicit Pool(int helpers) {
-    for (int i = 0; i < helpers; ++i) {
-      threads_.emplace_back([this, worker = i + 1] { loop(worker); });
-    }
+  explicit Pool(size_t helpers) {
+    if (start(helpers)) return;
+    // At the limit no library could start a thread of its own, and no memory would be left to work
+    // with: half of what was given goes back.
+    keep(threads_.size() / 2);
   }
-  ~Pool() {
-    {
-      const std::lock_guard lock(mutex_);
-      quit_ = true;
-    }
-    wake_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
+  ~Pool() { keep(0); }
   Pool(const Pool&) = delete;
   Pool& operator=(const Pool&) = delete;
+
+  int workers() const { return 1 + static_cast<int>(threads_.size()); }
 
   void run(Job& job) {
     const std::lock_guard one_job_at_a_time(run_mutex_);
@@ -84,12 +81,40 @@ class Pool {
   }
 
  private:
+  // Whether the system gave them all. Threads that run are joined in any case: one that is not
+  // would end the program, or wait for ever on a condition that is gone.
+  bool start(size_t helpers) {
+    try {
+      kept_ = helpers;
+      threads_.reserve(helpers);
+      while (threads_.size() < helpers) {
+        threads_.emplace_back(
+            [this, worker = static_cast<int>(threads_.size()) + 1] { loop(worker); });
+      }
+      return true;
+    } catch (const std::system_error&) {  // a limit on threads
+      return false;
+    } catch (const std::bad_alloc&) {
+      return false;
+    }
+  }
+
+  void keep(size_t helpers) {
+    {
+      const std::lock_guard lock(mutex_);
+      kept_ = helpers;
+    }
+    wake_.notify_all();
+    for (; threads_.size() > helpers; threads_.pop_back()) threads_.back().join();
+  }
+
   void loop(int worker) {
     uint64_t seen = 0;
     std::unique_lock lock(mutex_);
+    const auto is_superfluous = [&] { return static_cast<size_t>(worker) > kept_; };
     while (true) {
-      wake_.wait(lock, [&] { return quit_ || generation_ != seen; });
-      if (quit_) return;
+      wake_.wait(lock, [&] { return is_superfluous() || generation_ != seen; });
+      if (is_superfluous()) return;
       seen = generation_;
       Job* job = job_;
       lock.unlock();
@@ -107,7 +132,7 @@ class Pool {
   Job* job_ = nullptr;
   int running_ = 0;
   uint64_t generation_ = 0;
-  bool quit_ = false;
+  size_t kept_ = 0;  // helpers with a larger number end
 };
 
 int available_processors() {
@@ -124,7 +149,10 @@ std::shared_ptr<Pool> g_pool;
 std::shared_ptr<Pool> pool() {
   const int threads = num_threads();
   const std::lock_guard lock(g_pool_mutex);
-  if (!g_pool) g_pool = std::make_shared<Pool>(threads - 1);
+  if (!g_pool) {
+    g_pool = std::make_shared<Pool>(static_cast<size_t>(threads - 1));
+    g_num_threads = g_pool->workers();
+  }
   return g_pool;
 }
 
@@ -144,6 +172,8 @@ void set_num_threads(int count) {
   g_num_threads = count;
   old.swap(g_pool);
 }
+
+int start_threads() { return num_threads() == 1 ? 1 : pool()->workers(); }
 
 void parallel_for_workers(int64_t size, int64_t grain,
                           const std::function<void(int64_t, int64_t, int)>& body) {

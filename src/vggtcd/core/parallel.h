@@ -14,6 +14,10 @@ namespace vggtcd {
 int num_threads();
 void set_num_threads(int count);  // count >= 1, else Error{kUsage}
 
+// Starts the threads now instead of in the first parallel_for and returns num_threads(), which is
+// less than before where the system (a limit on processes or memory) gives fewer.
+int start_threads();
+
 // Calls body(begin, end) for each chunk [begin, end) of [0, size), chunk k = [k*grain,
 // (k+1)*grain). Returns when all are done. The first exception of a chunk is thrown here and no
 // further chunk is started; likewise Error{kInterrupted}. A parallel_for inside a parallel_for runs

@@ -2,8 +2,10 @@
 #include "vggtcd/core/parallel.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <numeric>
 #include <vector>
 
@@ -86,6 +88,43 @@ TEST_P(ParallelFor, NestedLoopsRunSeriallyAndWorkersStayInRange) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, ::testing::Values(1, 2, 5));
+
+// With little address space, which stands for any limit: the stacks of a thousand threads take 8
+// GB. Exits with 0 if a loop works on fewer threads than were asked for, but on more than one.
+[[noreturn]] void work_where_threads_are_short() {
+  const rlimit limit{rlim_t{1} << 30, rlim_t{1} << 30};
+  if (setrlimit(RLIMIT_AS, &limit) != 0) std::_Exit(2);
+  constexpr int kAsked = 1000;
+  set_num_threads(kAsked);
+  const int given = start_threads();
+  if (given >= kAsked || given < 2 || num_threads() != given) std::_Exit(3);
+  std::vector<std::atomic<int>> visits(5000);
+  parallel_for_workers(5000, 1, [&](int64_t begin, int64_t, int worker) {
+    if (worker < given) ++visits[static_cast<size_t>(begin)];
+  });
+  for (const auto& count : visits) {
+    if (count != 1) std::_Exit(4);
+  }
+  set_num_threads(1);  // ends them
+  std::_Exit(0);
+}
+
+TEST(StartThreads, GoesOnWithThoseThatTheSystemGives) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer needs its address space";
+#endif
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(work_where_threads_are_short(), ::testing::ExitedWithCode(0), "");
+}
+
+TEST(StartThreads, SaysHowManyWork) {
+  set_num_threads(3);
+  EXPECT_EQ(start_threads(), 3);
+  EXPECT_EQ(num_threads(), 3);
+  set_num_threads(1);
+  EXPECT_EQ(start_threads(), 1);
+  set_num_threads(2);
+}
 
 TEST(SetNumThreads, RefusesZero) { EXPECT_THROW(set_num_threads(0), Error); }
 

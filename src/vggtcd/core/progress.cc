@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <new>
 
 #include "vggtcd/core/timer.h"
 
@@ -35,7 +36,11 @@ ProgressStage::ProgressStage(ProgressSink& sink, std::string name)
 
 ProgressStage::~ProgressStage() {
   if (std::uncaught_exceptions() > exceptions_) return;
-  sink_.stage_finished(name_, seconds());
+  try {
+    sink_.stage_finished(name_, seconds());
+  } catch (const std::bad_alloc&) {
+    // Too little memory for the words: the work says so when it needs some itself.
+  }
 }
 
 void ProgressStage::advance(double fraction) {

@@ -15,6 +15,7 @@
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/synthetic/dataset.h"
 #include "vggtcd/evaluation/wat.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
@@ -122,7 +123,7 @@ std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files
   std::vector<AblationOutcome> outcomes;
   for (const int keyframes : kAblationKeyframes) {
     const std::filesystem::path file = files / wat_joint_name(keyframes);
-    if (std::filesystem::exists(file)) {
+    if (exists_at(file)) {
       const JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
       outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, truth));
     } else if (problem.joint.keyframes_t1.size() == static_cast<size_t>(keyframes)) {

@@ -13,6 +13,7 @@
 #include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/synthetic/scene.h"
 #include "vggtcd/evaluation/wat.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
 
 namespace vggtcd {
@@ -59,16 +60,21 @@ Json fingerprint(const BenchmarkOptions& options) {
 // Calls `run` unless the file has the outcome of the same options.
 SceneOutcome resume_or_run(const fs::path& file, const Json& options,
                            const std::function<SceneOutcome()>& run, ProgressSink& progress) {
-  if (fs::exists(file)) {
+  if (exists_at(file)) {
+    const auto not_usable = [&](std::string_view why) {
+      progress.notice(fmt::format("{}: not usable, computed again ({})", file.string(), why));
+    };
     try {
       const Json kept = read_json_file(file);
       if (kept.at("options") == options) {
         progress.notice(fmt::format("{}: finished before, kept", file.filename().string()));
         return scene_outcome_from_json(kept.at("outcome"));
       }
-    } catch (const std::exception& error) {
-      progress.notice(
-          fmt::format("{}: not usable, computed again ({})", file.string(), error.what()));
+    } catch (const Json::exception& error) {
+      not_usable(error.what());
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInput) throw;
+      not_usable(error.what());
     }
   }
   SceneOutcome outcome = run();
@@ -78,11 +84,7 @@ SceneOutcome resume_or_run(const fs::path& file, const Json& options,
 
 void make_output(const fs::path& out) {
   for (const char* folder : {"scenes", "rivals"}) {
-    std::error_code error;
-    fs::create_directories(out / folder, error);
-    if (error) {
-      throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", out.string(), error.message());
-    }
+    make_folder(out / folder);
   }
 }
 
@@ -118,8 +120,8 @@ std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& dat
   const std::vector<std::string> scenes = chosen_scenes(options.scenes, list_wat_scenes(data));
   make_output(out);
   Json key = fingerprint(options);
-  key["data"] = fs::absolute(data).lexically_normal().string();
-  key["predictions"] = fs::absolute(predictions.directory).lexically_normal().string();
+  key["data"] = absolute_path(data).lexically_normal().string();
+  key["predictions"] = absolute_path(predictions.directory).lexically_normal().string();
   key["made_by"] = predictions.made_by;
   for (const std::string& scene : scenes) {
     progress.notice(scene);

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/sim3_file.h"
 
@@ -69,14 +70,16 @@ MethodAnswer run_or_recall(const RegistrationMethod& method, const RegistrationP
                            uint64_t hash, const std::filesystem::path& directory) {
   if (directory.empty()) return run(method, problem);
   const std::filesystem::path file = directory / fmt::format("{}_{:016x}.json", method.name, hash);
-  if (std::filesystem::exists(file)) {
+  if (exists_at(file)) {
     try {
       const Json kept = read_json_file(file);
       return {kept.at("failure").get<std::string>(),
               sim3_from_json(kept.at("t2_from_t1"), file.string()),
               kept.at("seconds").get<double>()};
-    } catch (const std::exception&) {
+    } catch (const Json::exception&) {
       // Broken: computed and written again.
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::kInput) throw;
     }
   }
   const MethodAnswer answer = run(method, problem);

@@ -10,6 +10,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/paper_numbers.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/file_system.h"
 
 namespace vggtcd {
 namespace {
@@ -67,12 +68,11 @@ std::map<std::string, Rigid3> registered_poses(const fs::path& scene_directory) 
 std::vector<WatSequence> list_wat_sequences(const fs::path& scene_directory) {
   std::vector<WatSequence> sequences;
   const fs::path images = scene_directory / "images";
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(images, error)) {
-    if (!entry.is_directory()) continue;
-    WatSequence sequence{entry.path().filename().string(), {}};
-    for (const auto& file : fs::directory_iterator(entry.path())) {
-      if (is_photo(file.path())) sequence.photos.push_back(file.path().filename().string());
+  for (const fs::path& entry : list_folder(images)) {
+    if (!is_folder(entry)) continue;
+    WatSequence sequence{entry.filename().string(), {}};
+    for (const fs::path& file : list_folder(entry)) {
+      if (is_photo(file)) sequence.photos.push_back(file.filename().string());
     }
     std::sort(sequence.photos.begin(), sequence.photos.end());
     if (!sequence.photos.empty()) sequences.push_back(std::move(sequence));
@@ -93,11 +93,10 @@ std::vector<WatSequence> list_wat_sequences(const fs::path& scene_directory) {
 
 std::vector<std::string> list_wat_scenes(const fs::path& data) {
   std::vector<std::string> found;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(data, error)) {
-    if (fs::is_directory(entry.path() / "images") &&
-        fs::is_directory(entry.path() / "sparse" / "0"))
-      found.push_back(entry.path().filename().string());
+  for (const fs::path& entry : list_folder(data)) {
+    if (is_folder(entry / "images") && is_folder(entry / "sparse" / "0")) {
+      found.push_back(entry.filename().string());
+    }
   }
   if (found.empty()) {
     throw_error(ErrorCode::kInput,

@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/text_line.h"
 
 namespace vggtcd {
@@ -34,11 +36,8 @@ constexpr CameraModel kModels[] = {{"SIMPLE_PINHOLE", 3},
 // A binary file in memory, read field by field.
 class BinaryReader {
  public:
-  explicit BinaryReader(const std::filesystem::path& path) : name_(path.string()) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw_error(ErrorCode::kInput, "{}: expected a readable file", name_);
-    bytes_.assign(std::istreambuf_iterator<char>(file), {});
-  }
+  explicit BinaryReader(const std::filesystem::path& path)
+      : name_(path.string()), bytes_(InputFile(path, "a file of a COLMAP model").read_all()) {}
   template <typename T>
   T get() {
     need(sizeof(T), 1);
@@ -150,8 +149,7 @@ void read_binary_points(const std::filesystem::path& path, ColmapModel& model) {
 // Calls use(line) for each line of data; with `pairs`, each is followed by a line that is skipped.
 template <typename Use>
 void for_each_line(const std::filesystem::path& path, bool pairs, const Use& use) {
-  std::ifstream file(path);
-  if (!file) throw_error(ErrorCode::kInput, "{}: expected a readable file", path.string());
+  InputFile file(path, "a file of a COLMAP model");
   std::string text;
   bool skip = false;
   for (int number = 1; std::getline(file, text); ++number) {
@@ -221,10 +219,10 @@ std::vector<const ColmapImage*> sorted_images(const ColmapModel& model) {
 
 }  // namespace
 
-ColmapModel read_colmap(const std::filesystem::path& directory) {
+ColmapModel read_colmap(const std::filesystem::path& directory) try {
   ColmapModel model;
-  const bool binary = std::filesystem::exists(directory / "images.bin");
-  if (!binary && !std::filesystem::exists(directory / "images.txt")) {
+  const bool binary = exists_at(directory / "images.bin");
+  if (!binary && !exists_at(directory / "images.txt")) {
     throw_error(ErrorCode::kInput,
                 "{}: expected a COLMAP model (images.bin or images.txt), found neither",
                 directory.string());
@@ -237,7 +235,7 @@ ColmapModel read_colmap(const std::filesystem::path& directory) {
     read_text_images(directory / "images.txt", model);
   }
   const std::filesystem::path points = directory / (binary ? "points3D.bin" : "points3D.txt");
-  if (std::filesystem::exists(points)) {
+  if (exists_at(points)) {
     binary ? read_binary_points(points, model) : read_text_points(points, model);
   }
   for (const auto& [id, image] : model.images) {
@@ -247,6 +245,8 @@ ColmapModel read_colmap(const std::filesystem::path& directory) {
     }
   }
   return model;
+} catch (...) {
+  rethrow_naming(directory);
 }
 
 std::vector<View> colmap_views(const ColmapModel& model) {

@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
 #include "vggtcd/io/foreign_lines.h"
 #include "vggtcd/io/heif_image.h"
 #include "vggtcd/io/mapped_file.h"
@@ -289,9 +290,11 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name,
 }
 
 Image read_image(const std::filesystem::path& path, const ImageReadOptions& options,
-                 PhotoFacts* facts) {
+                 PhotoFacts* facts) try {
   // Not mapped: a photo that is written anew meanwhile would end the process.
   return decode_image(read_file_bytes(path), path.string(), options, facts);
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

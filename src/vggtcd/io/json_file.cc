@@ -2,10 +2,10 @@
 // JSON files and options structs as JSON.
 #include "vggtcd/io/json_file.h"
 
-#include <fstream>
-#include <iterator>
 #include <limits>
 
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
@@ -50,12 +50,8 @@ bool integer_to(const Json& json, T& value) {
 
 }  // namespace
 
-Json read_json_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw_error(ErrorCode::kInput, "{}: expected a readable JSON file", path.string());
-  }
-  const std::string text(std::istreambuf_iterator<char>(file), {});
+Json read_json_file(const std::filesystem::path& path) try {
+  const std::string text = InputFile(path, "a readable JSON file").read_all();
   if (too_deep(text)) {
     throw_error(ErrorCode::kInput, "{}: expected JSON nested at most 100 deep", path.string());
   }
@@ -65,6 +61,8 @@ Json read_json_file(const std::filesystem::path& path) {
     throw_error(ErrorCode::kInput, "{}: expected JSON, found something else at byte {}",
                 path.string(), error.byte);
   }
+} catch (...) {
+  rethrow_naming(path);
 }
 
 void write_json_file(const std::filesystem::path& path, const Json& json) {

@@ -15,45 +15,16 @@
 #include <cstdint>
 #include <cstring>
 #include <mutex>
+#include <new>
 #include <set>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_descriptor.h"
 
 namespace vggtcd {
 namespace {
-
-[[noreturn]] void fail(const std::filesystem::path& path, std::string_view why) {
-  throw_error(ErrorCode::kInput, "{}: cannot be read: {}", path.string(), why);
-}
-
-class Descriptor {
- public:
-  explicit Descriptor(const std::filesystem::path& path)
-      // Not blocking: opening a pipe nobody writes to would wait for ever.
-      : fd_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
-    if (fd_ < 0) fail(path, std::strerror(errno));
-    struct stat status = {};
-    if (fstat(fd_, &status) != 0) refuse(path, std::strerror(errno));
-    if (S_ISDIR(status.st_mode)) refuse(path, "it is a directory, expected a file");
-    if (!S_ISREG(status.st_mode)) refuse(path, "it is not an ordinary file");
-    size_ = static_cast<size_t>(status.st_size);
-  }
-  ~Descriptor() { close(fd_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  int fd() const { return fd_; }
-  size_t size() const { return size_; }
-
- private:
-  [[noreturn]] void refuse(const std::filesystem::path& path, std::string_view why) const {
-    close(fd_);
-    fail(path, why);
-  }
-  int fd_;
-  size_t size_ = 0;
-};
 
 // What the signal handler may look at: mapped ranges and the sentence for each.
 struct Range {
@@ -109,7 +80,9 @@ size_t guard(const std::filesystem::path& path, std::span<const std::byte> bytes
   }();
   const auto place =
       std::find_if(g_ranges.begin(), g_ranges.end(), [](const Range& r) { return r.begin == 0; });
-  if (place == g_ranges.end()) fail(path, "too many files are open");
+  if (place == g_ranges.end()) {
+    throw_error(ErrorCode::kInput, "{}: cannot be read: too many files are open", path.string());
+  }
   const auto begin = reinterpret_cast<uintptr_t>(bytes.data());
   place->what = sentence_for(path);
   place->end = begin + bytes.size();
@@ -120,25 +93,29 @@ size_t guard(const std::filesystem::path& path, std::span<const std::byte> bytes
 }  // namespace
 
 std::vector<std::byte> read_file_bytes(const std::filesystem::path& path) {
-  const Descriptor file(path);
+  const InputDescriptor file(path, kAFile);
   std::vector<std::byte> bytes(file.size());
   for (size_t at = 0; at < bytes.size();) {
-    throw_if_interrupted();
     const size_t piece = std::min(bytes.size() - at, size_t{16} << 20);
-    const ssize_t count = read(file.fd(), bytes.data() + at, piece);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(path, std::strerror(errno));
-    if (count == 0) fail(path, "it became shorter meanwhile; wait until it is complete");
-    at += static_cast<size_t>(count);
+    const size_t count = file.read({reinterpret_cast<char*>(bytes.data()) + at, piece});
+    if (count == 0) {
+      throw_error(ErrorCode::kInput,
+                  "{}: cannot be read: it became shorter meanwhile; wait until it is complete",
+                  path.string());
+    }
+    at += count;
   }
   return bytes;
 }
 
 MappedFile::MappedFile(const std::filesystem::path& path) {
-  const Descriptor file(path);
+  const InputDescriptor file(path, kAFile);
   if (file.size() == 0) return;
-  void* memory = mmap(nullptr, file.size(), PROT_READ, MAP_PRIVATE, file.fd(), 0);
-  if (memory == MAP_FAILED) fail(path, std::strerror(errno));
+  void* memory = mmap(nullptr, file.size(), PROT_READ, MAP_PRIVATE, file.number(), 0);
+  if (memory == MAP_FAILED && errno == ENOMEM) throw std::bad_alloc();
+  if (memory == MAP_FAILED) {
+    throw_error(ErrorCode::kInput, "{}: cannot be read: {}", path.string(), std::strerror(errno));
+  }
   const std::span<const std::byte> bytes(static_cast<const std::byte*>(memory), file.size());
   try {
     guard_ = guard(path, bytes);

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <type_traits>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
@@ -249,13 +250,9 @@ std::vector<std::string> read_npy_strings(const NpyHeader& header, const ReadByt
   return strings;
 }
 
-NpyDoubles read_npy_file(const std::filesystem::path& path) {
+NpyDoubles read_npy_file(const std::filesystem::path& path) try {
   const std::string what = path.string();
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw_error(ErrorCode::kInput, "{}: expected a readable .npy file, found {}", what,
-                std::filesystem::exists(path) ? "something that cannot be opened" : "nothing");
-  }
+  InputFile file(path, "a readable .npy file");
   const ReadBytes read = [&](std::span<std::byte> bytes) {
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     if (static_cast<size_t>(file.gcount()) != bytes.size()) {
@@ -265,7 +262,7 @@ NpyDoubles read_npy_file(const std::filesystem::path& path) {
   const NpyHeader header = read_npy_header(read, what);
   // Before memory is reserved: the file must have what the header promises.
   const auto position = static_cast<int64_t>(file.tellg());
-  const auto left = static_cast<int64_t>(std::filesystem::file_size(path)) - position;
+  const auto left = static_cast<int64_t>(file.size()) - position;
   if (header.item_size > 0 && header.data_bytes() != left) {
     throw_error(ErrorCode::kInput, "{}: expected {} bytes of data, found {}", what,
                 header.data_bytes(), left);
@@ -275,6 +272,8 @@ NpyDoubles read_npy_file(const std::filesystem::path& path) {
   result.values.resize(static_cast<size_t>(header.numel()));
   read_npy_array<double>(header, read, what, result.values);
   return result;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 void write_npy_file(const std::filesystem::path& path, std::span<const int64_t> shape,

@@ -6,11 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <fstream>
+#include <new>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/tensor_view.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/quote.h"
 
@@ -19,6 +22,11 @@ namespace {
 
 // Deflate cannot expand by more than this (zlib's technical notes).
 constexpr uint64_t kMaxDeflateRatio = 1032;
+
+// libzip says that memory was short like any other failure.
+void throw_if_memory(int zip_error) {
+  if (zip_error == ZIP_ER_MEMORY) throw std::bad_alloc();
+}
 
 // What a file that libzip does not open looks like, so that the message can say it.
 std::string describe_bytes(std::string_view start, int zip_error) {
@@ -36,8 +44,10 @@ std::string describe_bytes(std::string_view start, int zip_error) {
   return fmt::format("other data ({})", text);
 }
 
+constexpr std::string_view kExpected = "a NumPy .npz file";
+
 std::string start_of_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
+  InputFile file(path, kExpected);
   std::string start(32, '\0');
   file.read(start.data(), static_cast<std::streamsize>(start.size()));
   start.resize(static_cast<size_t>(file.gcount()));
@@ -45,7 +55,7 @@ std::string start_of_file(const std::filesystem::path& path) {
 }
 
 [[noreturn]] void throw_not_npz(std::string_view name, std::string_view found) {
-  throw_error(ErrorCode::kInput, "{}: expected a NumPy .npz file, found {}", name, found);
+  throw_error(ErrorCode::kInput, "{}: expected {}, found {}", name, kExpected, found);
 }
 
 // One member of the archive, open for reading from its start.
@@ -54,6 +64,7 @@ class Member {
   Member(zip_t* zip, uint64_t index, std::string what)
       : file_(zip_fopen_index(zip, index, 0)), what_(std::move(what)) {
     if (file_ == nullptr) {
+      throw_if_memory(zip_error_code_zip(zip_get_error(zip)));
       throw_error(ErrorCode::kInput, "{}: cannot be unpacked: {}", what_, zip_strerror(zip));
     }
   }
@@ -88,6 +99,7 @@ class Member {
   size_t read_some(std::span<std::byte> bytes) {
     const zip_int64_t count = zip_fread(file_, bytes.data(), bytes.size());
     if (count < 0) {
+      throw_if_memory(zip_error_code_zip(zip_file_get_error(file_)));
       throw_error(ErrorCode::kInput, "{}: damaged data: {}; copy or download the file again", what_,
                   zip_file_strerror(file_));
     }
@@ -115,23 +127,20 @@ struct NpzReader::Entry {
   NpyHeader header;
 };
 
-NpzReader::NpzReader(const std::filesystem::path& path)
+NpzReader::NpzReader(const std::filesystem::path& path) try
     : name_(path.string()), zip_(std::make_unique<Zip>()) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw_not_npz(name_, "no such file");
-  if (!std::filesystem::is_regular_file(status)) {
-    throw_not_npz(name_, std::filesystem::is_directory(status) ? "a directory" : "no regular file");
-  }
-  zip_->file_bytes = std::filesystem::file_size(path, error);
-  if (error) throw_not_npz(name_, error.message());
+  if (!is_file(path)) throw_not_npz(name_, what_stands_at(path));
+  zip_->file_bytes = size_of_file(path);
   int zip_error = 0;
   zip_->handle = zip_open(path.c_str(), ZIP_RDONLY, &zip_error);
+  throw_if_memory(zip_->handle == nullptr ? zip_error : 0);
   if (zip_->handle == nullptr || zip_->file_bytes == 0) {
     throw_not_npz(name_, zip_error == ZIP_ER_OPEN ? std::string("a file that cannot be opened")
                                                   : describe_bytes(start_of_file(path), zip_error));
   }
   index();
+} catch (...) {
+  rethrow_naming(path);
 }
 
 NpzReader::NpzReader(std::span<const std::byte> bytes, std::string name)
@@ -140,11 +149,12 @@ NpzReader::NpzReader(std::span<const std::byte> bytes, std::string name)
   zip_error_t error;
   zip_error_init(&error);
   zip_source_t* source = zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error);
-  check(source != nullptr, "NpzReader: zip_source_buffer_create");
+  if (source == nullptr) throw std::bad_alloc();
   zip_->handle = zip_open_from_source(source, ZIP_RDONLY, &error);
   const int code = zip_error_code_zip(&error);
   zip_error_fini(&error);
   if (zip_->handle == nullptr) zip_source_free(source);
+  throw_if_memory(zip_->handle == nullptr ? code : 0);
   if (zip_->handle == nullptr || bytes.empty()) {
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     throw_not_npz(name_, describe_bytes(text, code));

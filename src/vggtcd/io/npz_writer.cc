@@ -9,6 +9,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/quote.h"
 
@@ -242,7 +243,7 @@ void NpzWriter::finish() {
   const auto fail = [&](std::string_view reason) {
     throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", path_.string(), reason);
   };
-  if (std::filesystem::is_directory(path_)) fail("is a directory");
+  if (is_folder(path_)) fail("is a directory");
   int open_error = 0;
   zip_t* zip = zip_open(path_.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &open_error);
   if (zip == nullptr) {

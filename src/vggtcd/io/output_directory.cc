@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/file_system.h"
 
 namespace vggtcd {
 namespace {
@@ -27,7 +28,8 @@ namespace fs = std::filesystem;
 fs::path resolve(const fs::path& target) {
   std::error_code error;
   if (target.empty()) fail(target, "no directory given");
-  fs::path resolved = fs::weakly_canonical(fs::absolute(target), error);
+  fs::path resolved = fs::absolute(target, error);
+  if (!error) resolved = fs::weakly_canonical(resolved, error);
   if (error) fail(target, error.message());
   if (!resolved.has_filename()) resolved = resolved.parent_path();
   if (resolved == resolved.root_path() || resolved == fs::current_path(error)) {
@@ -43,7 +45,7 @@ void check_replaceable(const fs::path& target) {
   if (!fs::is_directory(status)) fail(target, "is a file");
   const bool empty = fs::is_empty(target, error);
   if (error) fail(target, error.message());
-  if (!empty && !fs::exists(target / OutputDirectory::kMarker)) {
+  if (!empty && !exists_at(target / OutputDirectory::kMarker)) {
     fail(target, "is a directory that holds other files; name another one, or empty it");
   }
 }
@@ -53,17 +55,17 @@ void remove_stale(const fs::path& target, const std::vector<std::string>& kept) 
   const std::string prefix = target.filename().string() + ".partial-";
   std::vector<fs::path> stale;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(target.parent_path(), error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with(prefix) && entry.is_directory()) stale.push_back(entry.path());
+  for (fs::directory_iterator entry(target.parent_path(), error);
+       !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(prefix) && is_folder(entry->path())) stale.push_back(entry->path());
   }
   for (const fs::path& path : stale) {
     const auto lock =
         FileLock::try_lock(path / OutputDirectory::kMarker, FileLock::IfMissing::kGiveUp);
     if (!lock) continue;  // not ours, or its process lives
     for (const std::string& name : kept) {
-      const bool taken =
-          fs::exists(path / name) && fs::exists(target) && !fs::exists(target / name);
+      const bool taken = exists_at(path / name) && exists_at(target) && !exists_at(target / name);
       if (taken) fs::rename(path / name, target / name, error);
     }
     fs::remove_all(path, error);
@@ -78,8 +80,7 @@ OutputDirectory::OutputDirectory(const fs::path& target, std::vector<std::string
   remove_stale(target_, kept_);
   aside_ = target_;
   aside_ += fmt::format(".partial-{}", getpid());
-  for (fs::path parent = target_.parent_path(); !fs::exists(parent);
-       parent = parent.parent_path()) {
+  for (fs::path parent = target_.parent_path(); !exists_at(parent); parent = parent.parent_path()) {
     first_created_parent_ = parent;
   }
   std::error_code error;
@@ -124,11 +125,11 @@ void OutputDirectory::commit() {
   check_replaceable(target_);  // somebody may have put something there meanwhile
   std::error_code error;
   for (const std::string& name : kept_) {
-    if (!fs::exists(target_ / name)) continue;
+    if (!exists_at(target_ / name)) continue;
     fs::rename(target_ / name, aside_ / name, error);
     if (error) fail(target_, error.message());
   }
-  if (!fs::exists(target_)) {
+  if (!exists_at(target_)) {
     fs::rename(aside_, target_, error);
     if (error) fail(target_, error.message());
     committed_ = true;

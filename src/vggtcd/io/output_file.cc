@@ -6,13 +6,16 @@
 
 #include <cerrno>
 #include <cstring>
+#include <new>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/file_system.h"
 
 namespace vggtcd {
 namespace {
 
 [[noreturn]] void throw_cannot_write(const std::filesystem::path& path, int error) {
+  if (error == ENOMEM) throw std::bad_alloc();
   throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", path.string(), std::strerror(error));
 }
 
@@ -28,11 +31,9 @@ std::string aside_name(const std::string& name) {
 
 OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
   // A link stays, its target is replaced; a device or a pipe would be.
-  if (std::filesystem::is_symlink(path_) && std::filesystem::exists(path_)) {
-    path_ = std::filesystem::canonical(path_);
-  }
-  if (std::filesystem::is_directory(path_)) throw_cannot_write(path_, EISDIR);
-  if (std::filesystem::exists(path_) && !std::filesystem::is_regular_file(path_)) {
+  if (is_link(path_) && exists_at(path_)) path_ = without_links(path_);
+  if (is_folder(path_)) throw_cannot_write(path_, EISDIR);
+  if (exists_at(path_) && !is_file(path_)) {
     throw_error(ErrorCode::kOutput, "{}: expected a file to replace, found a device or a pipe",
                 path_.string());
   }

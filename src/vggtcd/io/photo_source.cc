@@ -6,13 +6,15 @@
 
 #include <algorithm>
 #include <cctype>
-#include <fstream>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/photo_companions.h"
 #include "vggtcd/io/picture_header.h"
@@ -38,41 +40,47 @@ std::string ending_of(const fs::path& path) {
 }
 
 bool is_pattern(const std::string& source) {
-  return source.find_first_of("*?[") != std::string::npos && !fs::exists(source);
+  return source.find_first_of("*?[") != std::string::npos && !exists_at(source);
 }
 
 struct Listing {
   std::vector<fs::path> files;
   size_t others = 0;  // of a folder: visible files that are not pictures
   std::string an_other;
-  std::string a_folder;  // below a folder: one that is visible, without its pictures
+  std::string a_folder;              // below a folder: one that is visible, without its pictures
+  std::vector<fs::path> unreadable;  // of a folder: named like pictures, but no ordinary files
 };
 
 // An empty pattern: the pictures.
 Listing files_matching(const fs::path& folder, const std::string& pattern) {
-  std::error_code failed;
   Listing found;
-  for (const auto& entry : fs::directory_iterator(folder, failed)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::path& entry : list_folder(folder)) {
+    const std::string name = entry.filename().string();
     if (name.front() == '.') continue;
-    if (entry.is_directory()) found.a_folder = name;
-    if (!entry.is_regular_file()) continue;
-    const bool wanted = pattern.empty() ? kPictures.count(ending_of(entry.path())) > 0
+    const bool wanted = pattern.empty() ? kPictures.count(ending_of(entry)) > 0
                                         : fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
-    if (wanted) {
-      found.files.push_back(entry.path());
+    if (is_folder(entry)) {
+      found.a_folder = name;
+    } else if (!is_file(entry)) {
+      if (wanted) found.unreadable.push_back(entry);
+    } else if (wanted) {
+      found.files.push_back(entry);
     } else if (pattern.empty()) {
       ++found.others;
       found.an_other = name;
     }
   }
-  if (failed) {
-    throw_error(ErrorCode::kInput, "{}: cannot be listed ({})", folder.string(), failed.message());
-  }
   std::sort(found.files.begin(), found.files.end(), [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());
   });
   return found;
+}
+
+std::vector<PhotoRef> video_frames(const std::string& path, int frames,
+                                   ProgressSink& progress) try {
+  return read_video(path, frames, progress);
+} catch (...) {
+  rethrow_naming(path);
 }
 
 void leave_out_duplicates(std::vector<PhotoRef>& photos, ProgressSink& progress) {
@@ -89,15 +97,16 @@ void leave_out_duplicates(std::vector<PhotoRef>& photos, ProgressSink& progress)
 
 Listing list_files(const std::string& source) {
   const fs::path path(source);
-  if (fs::is_directory(path)) return files_matching(path, "");
+  if (is_folder(path)) return files_matching(path, "");
   if (is_pattern(source)) {
     const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
     return files_matching(folder, path.filename().string());
   }
-  if (!fs::exists(path)) {
-    throw_error(ErrorCode::kInput, "{}: no such file or folder", source);
+  if (!is_file(path)) {
+    throw_error(ErrorCode::kInput, "{}: expected a photo, a folder of photos or a video, found {}",
+                source, what_stands_at(path));
   }
-  return {{path}, 0, "", ""};
+  return {{path}, 0, "", "", {}};
 }
 
 // What there is instead of photos.
@@ -165,7 +174,7 @@ double sharpness(const Image& image) {
   return deviation[0] * deviation[0];
 }
 
-uint64_t content_hash(const PhotoRef& photo) {
+uint64_t content_hash(const PhotoRef& photo) try {
   uint64_t hash = 0xcbf29ce484222325u;
   const auto mix = [&hash](const char* bytes, size_t count) {
     for (size_t i = 0; i < count; ++i) {
@@ -176,22 +185,23 @@ uint64_t content_hash(const PhotoRef& photo) {
     mix(reinterpret_cast<const char*>(photo.decoded->rgb.data()), photo.decoded->rgb.size());
     return hash;
   }
-  std::ifstream file(photo.path, std::ios::binary);
-  if (!file) throw_error(ErrorCode::kInput, "{}: cannot be opened", photo.path.string());
+  const InputDescriptor file(photo.path, "a photo");
   std::vector<char> buffer(1 << 20);
-  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), file.gcount() > 0) {
-    mix(buffer.data(), static_cast<size_t>(file.gcount()));
-  }
+  while (const size_t count = file.read(buffer)) mix(buffer.data(), count);
   return hash;
+} catch (...) {
+  rethrow_naming(photo.path);
 }
 
 bool names_photos(const std::string& source) { return ending_of(source) != ".npz"; }
 
-Image load_photo(const PhotoRef& photo, const ImageReadOptions& options, PhotoFacts* facts) {
+Image load_photo(const PhotoRef& photo, const ImageReadOptions& options, PhotoFacts* facts) try {
   if (photo.decoded) return *photo.decoded;
   Image image = read_image(photo.path, options, facts);
   require_photo_size(image, photo.path.string());
   return image;
+} catch (...) {
+  rethrow_naming(photo.path);
 }
 
 void require_photo_size(const Image& image, const std::string& name) {
@@ -236,10 +246,10 @@ int photos_at_once(int64_t bytes) {
 
 std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOptions& options,
                                   ProgressSink& progress) {
-  if (kVideos.count(ending_of(source)) > 0 && fs::is_regular_file(source)) {
+  if (kVideos.count(ending_of(source)) > 0 && is_file(source)) {
     constexpr int kVideoFrames = 40;
     const int frames = options.max_frames > 0 ? options.max_frames : kVideoFrames;
-    std::vector<PhotoRef> photos = read_video(source, frames, progress);
+    std::vector<PhotoRef> photos = video_frames(source, frames, progress);
     leave_out_duplicates(photos, progress);
     return photos;
   }
@@ -247,6 +257,9 @@ std::vector<PhotoRef> find_photos(const std::string& source, const PhotoSourceOp
   std::vector<PhotoRef> photos;
   for (const fs::path& file : found.files) {
     photos.push_back({file, file.filename().string(), nullptr});
+  }
+  for (const fs::path& path : found.unreadable) {
+    progress.notice(fmt::format("{} is left out: it is {}", path.string(), what_stands_at(path)));
   }
   if (photos.empty()) {
     throw_error(ErrorCode::kInput, "{}: expected photos (jpg, png, heic, webp, tiff ...), found {}",

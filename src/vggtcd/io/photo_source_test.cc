@@ -23,7 +23,9 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 std::filesystem::path fresh_folder(const char* name) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) / name;
+  // Of this process alone: other checkouts may run the same test now.
+  static const TemporaryDirectory directory;
+  const auto folder = directory / name;
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
   return folder;

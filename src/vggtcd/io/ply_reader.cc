@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <fstream>
 #include <sstream>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/ply.h"
 
 namespace vggtcd {
@@ -34,9 +35,10 @@ struct Header {
   }
 };
 
+constexpr std::string_view kExpected = "a binary little-endian PLY point cloud";
+
 [[noreturn]] void throw_not_ply(const std::string& what, std::string_view found) {
-  throw_error(ErrorCode::kInput, "{}: expected a binary little-endian PLY point cloud, found {}",
-              what, found);
+  throw_error(ErrorCode::kInput, "{}: expected {}, found {}", what, kExpected, found);
 }
 
 bool set_type(Property& property, std::string_view type) {
@@ -140,16 +142,14 @@ struct PlyReader::Layout {
   std::vector<const Property*> properties;             // of the fields
 };
 
-PlyReader::PlyReader(const std::filesystem::path& path) : path_(path) {
+PlyReader::PlyReader(const std::filesystem::path& path) try : path_(path) {
   const std::string what = path.string();
-  std::ifstream file(path, std::ios::binary);
-  if (!file || !std::filesystem::is_regular_file(path)) throw_not_ply(what, "no readable file");
+  InputFile file(path, kExpected);
   auto layout = std::make_unique<Layout>();
   layout->header = read_header(file, what);
   layout->first_record = file.tellg();
   const Header& header = layout->header;
-  const auto available =
-      std::filesystem::file_size(path) - static_cast<uint64_t>(layout->first_record);
+  const auto available = file.size() - static_cast<uint64_t>(layout->first_record);
   const auto points = static_cast<uint64_t>(header.num_points);
   if (points > available / header.record_bytes) {
     throw_error(ErrorCode::kInput, "{}: expected {} points of {} bytes, found {} bytes; truncated",
@@ -172,6 +172,8 @@ PlyReader::PlyReader(const std::filesystem::path& path) : path_(path) {
     layout->properties.push_back(&property);
   }
   layout_ = std::move(layout);
+} catch (...) {
+  rethrow_naming(path);
 }
 
 PlyReader::~PlyReader() = default;
@@ -181,7 +183,7 @@ size_t PlyReader::size() const { return static_cast<size_t>(layout_->header.num_
 const std::vector<std::string>& PlyReader::fields() const { return layout_->fields; }
 
 void PlyReader::read(std::span<const std::string> fields,
-                     const std::function<void(const PlyCloud& block)>& sink) const {
+                     const std::function<void(const PlyCloud& block)>& sink) const try {
   const Layout& layout = *layout_;
   const size_t record_bytes = layout.header.record_bytes;
   const bool has_color = layout.color[0] != nullptr;
@@ -193,7 +195,7 @@ void PlyReader::read(std::span<const std::string> fields,
     wanted.push_back(layout.properties[static_cast<size_t>(found - layout.fields.begin())]);
     block.fields.push_back({name, {}});
   }
-  std::ifstream file(path_, std::ios::binary);
+  InputFile file(path_, kExpected);
   file.seekg(layout.first_record);
   std::vector<char> records;
   for (size_t first = 0; first < size(); first += kBlockPoints) {
@@ -216,6 +218,8 @@ void PlyReader::read(std::span<const std::string> fields,
     }
     sink(block);
   }
+} catch (...) {
+  rethrow_naming(path_);
 }
 
 PlyCloud read_ply(const std::filesystem::path& path) {

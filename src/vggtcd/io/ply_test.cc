@@ -137,7 +137,7 @@ TEST(ReadPly, RefusesOtherAndDamagedFiles) {
   expect(start + "element vertex 2\n" + xyz + std::string(23, 'a'),
          "expected 2 points of 12 bytes, found 23 bytes; truncated");
   expect(start + "element vertex 9000000000000000000\n" + xyz, "truncated");
-  EXPECT_INPUT_ERROR(read_ply(directory / "none.ply"), "found no readable file");
+  EXPECT_INPUT_ERROR(read_ply(directory / "none.ply"), "found no such file");
 }
 
 TEST(PlyWriter, WithoutCommitLeavesNothing) {

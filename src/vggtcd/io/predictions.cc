@@ -13,6 +13,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/failure.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/pose_matrix.h"
 #include "vggtcd/io/prediction_layout.h"
@@ -352,8 +353,10 @@ std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key, in
 }  // namespace
 
 Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
-                                   const PredictionLimits& limits) {
+                                   const PredictionLimits& limits) try {
   return read_arrays(NpzReader(path), progress, limits.min_frames);
+} catch (...) {
+  rethrow_naming(path);
 }
 
 bool prediction_has_images(const std::filesystem::path& path) {
@@ -369,7 +372,7 @@ PredictionSize prediction_size(const std::filesystem::path& path) {
 }
 
 JointReconstruction read_joint(const std::filesystem::path& path, const Reconstruction& before,
-                               const Reconstruction& after, ProgressSink& progress) {
+                               const Reconstruction& after, ProgressSink& progress) try {
   const NpzReader npz(path);
   JointReconstruction joint;
   joint.keyframes_t1 = read_keyframes(npz, "keyframes_t1", before.num_frames());
@@ -394,6 +397,8 @@ JointReconstruction read_joint(const std::filesystem::path& path, const Reconstr
     }
   }
   return joint;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <set>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/io/text_line.h"
 #include "vggtcd/io/trajectory.h"
@@ -37,11 +39,7 @@ std::string name_of(const TextLine& line, const std::string& text) {
 }
 
 std::vector<ReferenceCamera> read_table(const fs::path& path) {
-  std::ifstream file(path);
-  if (!file) {
-    throw_error(ErrorCode::kInput, "{}: expected camera positions, found no readable file",
-                path.string());
-  }
+  InputFile file(path, "camera positions");
   std::vector<ReferenceCamera> cameras;
   std::string text;
   bool may_be_heading = true;
@@ -76,9 +74,9 @@ std::vector<ReferenceCamera> read_model(const fs::path& path) {
 
 }  // namespace
 
-std::vector<ReferenceCamera> read_reference_cameras(const fs::path& path) {
+std::vector<ReferenceCamera> read_reference_cameras(const fs::path& path) try {
   const bool is_model =
-      fs::is_directory(path) || path.filename() == "images.txt" || path.filename() == "images.bin";
+      is_folder(path) || path.filename() == "images.txt" || path.filename() == "images.bin";
   std::vector<ReferenceCamera> cameras = is_model ? read_model(path) : read_table(path);
   std::set<std::string> names;
   for (const ReferenceCamera& camera : cameras) {
@@ -92,6 +90,8 @@ std::vector<ReferenceCamera> read_reference_cameras(const fs::path& path) {
                 path.string());
   }
   return cameras;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/pose_matrix.h"
 
@@ -68,7 +69,7 @@ Sim3 sim3_from_json(const Json& json, std::string_view where_view) {
   return checked(scale, rotation, {t[0], t[1], t[2]}, where);
 }
 
-Sim3 read_sim3(const std::filesystem::path& path) {
+Sim3 read_sim3(const std::filesystem::path& path) try {
   if (path.extension() != ".npz") return sim3_from_json(read_json_file(path), path.string());
   const NpzReader npz(path);
   for (const char* key : {"s", "R", "t"}) npz.header(key);
@@ -83,6 +84,8 @@ Sim3 read_sim3(const std::filesystem::path& path) {
                             t = npz.read<double>("t");
   return checked(s[0], Eigen::Map<const RowMajor33>(r.data()), Eigen::Vector3d(t[0], t[1], t[2]),
                  npz.name());
+} catch (...) {
+  rethrow_naming(path);
 }
 
 void write_sim3_npz(const std::filesystem::path& path, const Sim3& b_from_a) {

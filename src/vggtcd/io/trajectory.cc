@@ -5,6 +5,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/npy.h"
 #include "vggtcd/io/pose_matrix.h"
 #include "vggtcd/io/tum.h"
@@ -34,13 +35,13 @@ Trajectory read_npy_poses(const std::filesystem::path& path, PoseConvention conv
 }  // namespace
 
 Trajectory read_trajectory(const std::filesystem::path& path, PoseConvention npy_convention) {
-  if (!std::filesystem::exists(path)) {
+  if (!exists_at(path)) {
     throw_error(ErrorCode::kInput,
-                "{}: expected poses (.npy), a COLMAP model or a TUM file, found nothing",
-                path.string());
+                "{}: expected poses (.npy), a COLMAP model or a TUM file, found {}", path.string(),
+                what_stands_at(path));
   }
   if (path.extension() == ".npy") return read_npy_poses(path, npy_convention);
-  if (std::filesystem::is_directory(path)) return colmap_trajectory(read_colmap(path));
+  if (is_folder(path)) return colmap_trajectory(read_colmap(path));
   if (path.filename() == "images.txt" || path.filename() == "images.bin") {
     return colmap_trajectory(read_colmap(path.parent_path().empty() ? "." : path.parent_path()));
   }

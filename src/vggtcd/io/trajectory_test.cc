@@ -114,7 +114,7 @@ TEST(ReadTrajectory, ChoosesTheReaderByTheName) {
   EXPECT_EQ(read(model / "images.txt").size(), 3u);
   write_tum(directory / "a.txt", three_poses());
   EXPECT_EQ(read(directory / "a.txt").size(), 3u);
-  EXPECT_INPUT_ERROR(read(directory / "none.npy"), "found nothing");
+  EXPECT_INPUT_ERROR(read(directory / "none.npy"), "found no such file");
   EXPECT_INPUT_ERROR(read(source_file("tests/golden/npz/f32_2x3.npy")),
                      "expected poses of shape [N, 4, 4] or [N, 3, 4], found [2, 3]");
   // Matrices 0..15, 16..31, ...: (4, 3, 4), but no rotations.

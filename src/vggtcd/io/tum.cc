@@ -4,9 +4,10 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <fstream>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/text_line.h"
 
@@ -27,12 +28,8 @@ void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
   write_text_file(path, text);
 }
 
-Trajectory read_tum(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw_error(ErrorCode::kInput, "{}: expected a trajectory file, found no readable file",
-                path.string());
-  }
+Trajectory read_tum(const std::filesystem::path& path) try {
+  InputFile file(path, "a trajectory file");
   Trajectory trajectory;
   std::string line;
   for (int number = 1; std::getline(file, line); ++number) {
@@ -48,6 +45,8 @@ Trajectory read_tum(const std::filesystem::path& path) {
     throw_error(ErrorCode::kInput, "{}: expected camera poses, found none", path.string());
   }
   return trajectory;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

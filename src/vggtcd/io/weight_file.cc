@@ -7,6 +7,8 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/safetensors.h"
 #include "vggtcd/io/torch_checkpoint.h"
@@ -75,10 +77,10 @@ WeightFile parse_weight_file(std::span<const std::byte> bytes, const std::string
               "{}: expected safetensors or a PyTorch checkpoint, found neither", name);
 }
 
-WeightFile open_weight_file(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) {
-    throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file",
-                path.string());
+WeightFile open_weight_file(const std::filesystem::path& path) try {
+  if (!is_file(path)) {
+    throw_error(ErrorCode::kWeights, "{}: expected network weights, found {}", path.string(),
+                what_stands_at(path));
   }
   const auto mapped = std::make_shared<const MappedFile>(path);
   WeightFile file = [&] {
@@ -93,6 +95,8 @@ WeightFile open_weight_file(const std::filesystem::path& path) {
   file.storage = std::make_shared<const std::array<std::shared_ptr<const void>, 2>>(
       std::array<std::shared_ptr<const void>, 2>{mapped, file.storage});
   return file;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

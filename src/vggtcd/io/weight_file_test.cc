@@ -57,11 +57,11 @@ TEST(WeightFile, FailedDownloadsAreCalledWhatTheyAre) {
 
 TEST(WeightFile, WhatCannotBeReadIsNamed) {
   EXPECT_EQ(code_of("/no/such/file"), ErrorCode::kWeights);
-  EXPECT_EQ(code_of(::testing::TempDir()), ErrorCode::kInput);
+  EXPECT_EQ(code_of(::testing::TempDir()), ErrorCode::kWeights);
   const TemporaryDirectory directory;
   const std::string pipe = directory / "pipe";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_EQ(code_of(pipe), ErrorCode::kInput);  // and does not wait for a writer
+  EXPECT_EQ(code_of(pipe), ErrorCode::kWeights);  // and does not wait for a writer
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/core/version.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/output_file.h"
@@ -87,9 +88,9 @@ constexpr const char* kComplete = "reconstruction.json";
 // OUT holds nothing but what we may replace, so that .stages may live in it from now on.
 void claim(const fs::path& out) {
   { const OutputDirectory check(out, {kStages}); }
-  fs::create_directories(out / kStages);
+  make_folder(out / kStages);
   const fs::path marker = out / OutputDirectory::kMarker;
-  if (!fs::exists(marker)) {
+  if (!exists_at(marker)) {
     write_text_file(marker, "Written by vggt-cd, which may replace this directory.\n");
   }
 }
@@ -108,13 +109,13 @@ std::shared_ptr<const FileLock> lock_stages(const fs::path& out) {
 // adds a dot and six characters to an archive's name.
 void remove_partial_files(const fs::path& folder) {
   std::vector<fs::path> partial;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
+  for (const fs::path& entry : list_tree(folder)) {
+    const std::string name = entry.filename().string();
     const bool unfinished =
         name.find(".partial-") != std::string::npos || name.find(".npz.") != std::string::npos;
-    if (entry.is_regular_file() && unfinished) partial.push_back(entry.path());
+    if (is_file(entry) && unfinished) partial.push_back(entry);
   }
-  for (const fs::path& path : partial) fs::remove(path);
+  for (const fs::path& path : partial) remove_tree(path);
 }
 
 JobSize job_size(const ReconstructionPlan& plan, const Reconstructor& reconstructor) {
@@ -177,7 +178,7 @@ std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& option
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   ReconstructionPlan plan = reconstructor->plan(photos);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
-  if (fs::exists(kept / kComplete)) {
+  if (exists_at(kept / kComplete)) {
     plan.note = fmt::format("none: reconstruction of an earlier run is used again ({})",
                             escaped(kept.string()));
     plan.stages.clear();
@@ -218,11 +219,11 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
   done.lock = lock_stages(out);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
   const fs::path complete = kept / kComplete;
-  if (fs::exists(complete)) {
+  if (exists_at(complete)) {
     progress.notice(
         fmt::format("reconstruction of an earlier run is used again ({})", kept.string()));
   } else {
-    fs::create_directories(kept);
+    make_folder(kept);
     remove_partial_files(kept);
     progress.job_planned(whole_job(reconstructor->plan(photos), *reconstructor, options,
                                    decides_by_votes(options, reconstructor->leaves_holes())));
@@ -230,7 +231,7 @@ ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOp
     write_json_file(complete,
                     Json{{"reconstructor", reconstructor->name()}, {"explanation", explanation}});
   }
-  fs::remove_all(kept / "work");
+  remove_tree(kept / "work");
   done.inputs.before = photos.before.given ? fs::path(inputs.before) : kept / kBeforeFile;
   done.inputs.after = photos.after.given ? fs::path(inputs.after) : kept / kAfterFile;
   done.inputs.joint = kept / kJointFile;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/reconstruction/vggt_reconstructor.h"
 
@@ -39,12 +40,12 @@ Json identity(const PhotoEpochs& photos, const VggtReconstructor& network) {
 
 // Leaves nothing in the directory that was made from other photos or by another network.
 void claim(const fs::path& directory, const Json& made_from, const std::vector<JointPass>& joints) {
-  fs::create_directories(directory);
+  make_folder(directory);
   const fs::path note = directory / "photos.json";
-  if (fs::exists(note) && read_json_file(note) == made_from) return;
-  fs::remove_all(directory / "work");
-  for (const auto& epoch : kEpochs) fs::remove(directory / epoch.file);
-  for (const JointPass& joint : joints) fs::remove(directory / joint.file);
+  if (exists_at(note) && read_json_file(note) == made_from) return;
+  remove_tree(directory / "work");
+  for (const auto& epoch : kEpochs) remove_tree(directory / epoch.file);
+  for (const JointPass& joint : joints) remove_tree(directory / joint.file);
   write_json_file(note, made_from);
 }
 
@@ -64,9 +65,9 @@ void predict_epochs(const PhotoPaths& paths, const fs::path& weights, const Vggt
   const fs::path work = directory / "work";
   const int all = static_cast<int>(std::max(paths.before.size(), paths.after.size()));
   for (const JointPass& joint : joints) {
-    const bool complete = fs::exists(directory / joint.file) &&
-                          fs::exists(directory / kEpochs[0].file) &&
-                          fs::exists(directory / kEpochs[1].file);
+    const bool complete = exists_at(directory / joint.file) &&
+                          exists_at(directory / kEpochs[0].file) &&
+                          exists_at(directory / kEpochs[1].file);
     if (complete) continue;
     const VggtReconstructor reconstructor(
         {.weights = weights,
@@ -79,21 +80,21 @@ void predict_epochs(const PhotoPaths& paths, const fs::path& weights, const Vggt
                                   static_cast<double>(needed) * 1e-9));
       continue;
     }
-    fs::create_directories(work);
+    make_folder(work);
     for (const auto& epoch : kEpochs) {
-      if (!fs::exists(directory / epoch.file)) continue;
-      fs::copy_file(directory / epoch.file, work / epoch.scratch, fs::copy_options::skip_existing);
+      if (!exists_at(directory / epoch.file)) continue;
+      copy_unless_there(directory / epoch.file, work / epoch.scratch);
     }
-    fs::remove(work / "joint.npz");
+    remove_tree(work / "joint.npz");
     reconstructor.reconstruct(photos, work, progress);
-    fs::rename(work / "joint.npz", directory / joint.file);
+    move_to(work / "joint.npz", directory / joint.file);
     for (const auto& epoch : kEpochs) {
-      if (!fs::exists(directory / epoch.file)) {
-        fs::rename(work / epoch.scratch, directory / epoch.file);
+      if (!exists_at(directory / epoch.file)) {
+        move_to(work / epoch.scratch, directory / epoch.file);
       }
     }
   }
-  fs::remove_all(work);
+  remove_tree(work);
 }
 
 }  // namespace vggtcd

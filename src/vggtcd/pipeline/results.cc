@@ -8,6 +8,7 @@
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/image_write.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/ply.h"
@@ -317,7 +318,7 @@ void write_change_npz(const std::filesystem::path& path, const Reconstruction& b
 
 void write_overlays(const std::filesystem::path& directory, const Reconstruction& epoch,
                     const EpochChange& change, const ChangeSet& changes) {
-  std::filesystem::create_directories(directory);
+  make_folder(directory);
   std::vector<std::string> names;
   for (const View& view : epoch.views) names.push_back(view.name);
   const std::vector<std::string> files = overlay_names(names);
@@ -354,7 +355,7 @@ void write_cameras(const std::filesystem::path& directory, const Reconstruction&
   write_tum(directory / "cameras_before.tum", trajectory_of(views), comment);
   write_tum(directory / "cameras_after.tum", trajectory_of(views_t2), comment);
   views.insert(views.end(), views_t2.begin(), views_t2.end());
-  std::filesystem::create_directories(directory / "colmap");
+  make_folder(directory / "colmap");
   write_colmap_text(directory / "colmap", views);
 }
 

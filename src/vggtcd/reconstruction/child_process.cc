@@ -16,6 +16,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
+#include "vggtcd/io/file_system.h"
 
 namespace vggtcd {
 namespace {
@@ -25,7 +26,7 @@ std::string find_in_path(const std::string& program) {
   std::stringstream folders(path ? path : "/usr/bin:/bin");
   for (std::string folder; std::getline(folders, folder, ':');) {
     const std::string file = (folder.empty() ? "." : folder) + "/" + program;
-    if (access(file.c_str(), X_OK) == 0 && !std::filesystem::is_directory(file)) return file;
+    if (access(file.c_str(), X_OK) == 0 && is_file(file)) return file;
   }
   return {};
 }
@@ -57,6 +58,7 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
   dup2(log, STDERR_FILENO);
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
+  signal(SIGPIPE, SIG_DFL);
   execve(file, arguments, environment);
   _exit(127);
 }

@@ -3,11 +3,10 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <fstream>
 #include <iterator>
-#include <thread>
 
+#include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
 
@@ -17,7 +16,9 @@ namespace {
 using ::testing::HasSubstr;
 
 std::filesystem::path fresh_log(const char* name) {
-  const auto path = std::filesystem::path(::testing::TempDir()) / name;
+  // Of this process alone: other checkouts may run the same test now.
+  static const TemporaryDirectory directory;
+  const auto path = directory / name;
   std::filesystem::remove(path);
   return path;
 }
@@ -56,17 +57,12 @@ TEST(RunProgram, CallsBackEvenIfTheProgramEndsAtOnce) {
 }
 
 TEST(RunProgram, EndsTheChildWhenInterrupted) {
-  std::thread user([] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    request_interrupt();
-  });
   try {
-    run_program({"sleep", "1000"}, fresh_log("run_program_interrupt.log"), "");
+    run_program({"sleep", "1000"}, fresh_log("run_program_interrupt.log"), "", request_interrupt);
     ADD_FAILURE() << "not interrupted";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::kInterrupted);
   }
-  user.join();
   clear_interrupt();
 }
 

@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/reconstruction/classical_reconstructor.h"
 #include "vggtcd/reconstruction/vggt_reconstructor.h"
 
@@ -19,7 +20,7 @@ std::string found_weights(const std::string& given) {
   const char* home = std::getenv("HOME");
   const auto usual =
       std::filesystem::path(home ? home : "") / ".local/share/vggt-cd/model.safetensors";
-  return std::filesystem::is_regular_file(usual) ? usual.string() : std::string();
+  return is_file(usual) ? usual.string() : std::string();
 }
 
 }  // namespace
@@ -46,10 +47,9 @@ std::filesystem::path require_weights(const std::string& given) {
                 "~/.local/share/vggt-cd/model.safetensors; {}",
                 kWithoutWeights);
   }
-  if (!std::filesystem::is_regular_file(weights)) {
+  if (!is_file(weights)) {
     throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found {}; {}",
-                given.empty() ? "VGGTCD_WEIGHTS: " : "", weights,
-                std::filesystem::exists(weights) ? "no file but a directory" : "no such file",
+                given.empty() ? "VGGTCD_WEIGHTS: " : "", weights, what_stands_at(weights),
                 kWithoutWeights);
   }
   return weights;

@@ -9,6 +9,7 @@
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/reconstruction/undistort.h"
 
@@ -329,7 +330,7 @@ std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const
   const std::vector<DepthTask> tasks = plan_depth(sfm.model, epoch_of_view, options_.views);
   const auto epoch = [&](const EpochTask& task, const EpochPhotos& of, const char* file) {
     const fs::path kept = (of.given ? work : folder) / file;
-    if (!fs::exists(kept)) {
+    if (!exists_at(kept)) {
       ProgressStage stage(progress, std::string(task.name) + ": depth");
       write_reconstruction(kept, make_epoch(task, sfm, tasks, size, options_, stage));
     }
@@ -342,7 +343,7 @@ std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const
       epoch(epoch_task("before", photos.before.photos, 0, sfm), photos.before, kBeforeFile);
   const Reconstruction after =
       epoch(epoch_task("after", photos.after.photos, photos_t1, sfm), photos.after, kAfterFile);
-  if (!fs::exists(folder / kJointFile)) {
+  if (!exists_at(folder / kJointFile)) {
     JointReconstruction joint = joint_of_keyframes(before, after, options_.keyframes);
     renumber(photos.before, before, joint.keyframes_t1);
     renumber(photos.after, after, joint.keyframes_t2);

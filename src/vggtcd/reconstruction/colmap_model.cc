@@ -6,22 +6,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <map>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/input_file.h"
 
 namespace vggtcd {
 namespace {
 
 class ByteReader {
  public:
-  explicit ByteReader(const std::filesystem::path& path) : name_(path.string()) {
-    std::ifstream file(path, std::ios::binary);
-    if (!file) throw_error(ErrorCode::kInput, "{}: cannot be opened", name_);
-    bytes_.assign(std::istreambuf_iterator<char>(file), {});
-  }
+  explicit ByteReader(const std::filesystem::path& path)
+      : name_(path.string()), bytes_(InputFile(path, "a file of a COLMAP model").read_all()) {}
   template <typename T>
   T take() {
     T value;
@@ -88,7 +85,7 @@ std::map<uint32_t, RadialCamera> read_cameras(const std::filesystem::path& path)
 
 }  // namespace
 
-SfmModel read_colmap_model(const std::filesystem::path& folder) {
+SfmModel read_colmap_model(const std::filesystem::path& folder) try {
   const auto cameras = read_cameras(folder / "cameras.bin");
   ByteReader images(folder / "images.bin");
   std::vector<std::pair<SfmView, uint32_t>> views;
@@ -135,6 +132,8 @@ SfmModel read_colmap_model(const std::filesystem::path& folder) {
     model.points.push_back(std::move(point));
   }
   return model;
+} catch (...) {
+  rethrow_naming(folder);
 }
 
 }  // namespace vggtcd

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "tests/support/test_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/reconstruction/reconstructor.h"
 #include "vggtcd/reconstruction/trust.h"
@@ -52,7 +53,9 @@ class Bytes {
 };
 
 std::filesystem::path write_model(int32_t camera_model, size_t cut_points) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) / "colmap_model";
+  // Of this process alone: other checkouts may run the same test now.
+  static const TemporaryDirectory directory;
+  const auto folder = directory / "colmap_model";
   std::filesystem::create_directories(folder);
   Bytes()
       .put<uint64_t>(1)

@@ -6,6 +6,7 @@
 #include <array>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/failure.h"
 #include "vggtcd/io/npz.h"
 
 namespace vggtcd {
@@ -45,7 +46,7 @@ void write_matches(const std::filesystem::path& path, const SparseMatches& match
   writer.finish();
 }
 
-SparseMatches read_matches(const std::filesystem::path& path) {
+SparseMatches read_matches(const std::filesystem::path& path) try {
   const NpzReader reader(path);
   reader.expect_shape("points", std::array<int64_t, 2>{-1, 4});
   reader.expect_shape("pairs", std::array<int64_t, 2>{-1, 3});
@@ -84,6 +85,8 @@ SparseMatches read_matches(const std::filesystem::path& path) {
     result.pairs.push_back(std::move(pair));
   }
   return result;
+} catch (...) {
+  rethrow_naming(path);
 }
 
 }  // namespace vggtcd

@@ -11,6 +11,8 @@
 #include <set>
 #include <span>
 
+#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/input_file.h"
 #include "vggtcd/reconstruction/child_process.h"
 #include "vggtcd/reconstruction/match_file.h"
 #include "vggtcd/reconstruction/photo_cameras.h"
@@ -58,7 +60,7 @@ void write_image(const Image& image, const fs::path& path) {
   const cv::Mat rgb(image.height, image.width, CV_8UC3, const_cast<uint8_t*>(image.rgb.data()));
   cv::Mat gray;
   cv::cvtColor(rgb, gray, cv::COLOR_RGB2GRAY);
-  fs::create_directories(path.parent_path());
+  make_folder(path.parent_path());
   if (!cv::imwrite(path.string(), gray)) {
     throw_error(ErrorCode::kOutput, "{}: cannot be written", path.string());
   }
@@ -68,7 +70,7 @@ void write_image(const Image& image, const fs::path& path) {
 void write_features(const Features& features, const fs::path& path) {
   std::string zeros;
   for (int i = 0; i < kDescriptorSize; ++i) zeros += " 0";
-  fs::create_directories(path.parent_path());
+  make_folder(path.parent_path());
   std::ofstream out(path);
   fmt::print(out, "{} {}\n", features.points.size(), kDescriptorSize);
   for (const KeyPoint& p : features.points) {
@@ -110,7 +112,7 @@ class Colmap {
   // How many photos the mapper has tried to place since the last line that starts a model.
   int placed() const {
     int count = 0;
-    std::ifstream file(log());
+    InputFile file(log(), "COLMAP's log");
     for (std::string line; std::getline(file, line);) {
       if (line.starts_with("Registering image")) ++count;
       if (line.starts_with("Initializing with")) count = 2;
@@ -128,8 +130,8 @@ class Mapper {
   Mapper(const SfmPhotos& photos, const std::vector<ColmapPhoto>& listed,
          const SparseMatches& matches, const SfmOptions& options, fs::path folder)
       : photos_(photos), listed_(listed), options_(options), folder_(std::move(folder)) {
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
+    remove_tree(folder_);
+    make_folder(folder_);
     const std::vector<std::string> names = names_of(listed);
     for (size_t i = 0; i < names.size(); ++i) {
       write_image(photos.images[i], folder_ / "images" / names[i]);
@@ -144,7 +146,7 @@ class Mapper {
     const Colmap colmap(folder_);
     const std::string database = (folder_ / fmt::format("focal_{}.db", focal_factor)).string();
     const fs::path models = folder_ / fmt::format("focal_{}", focal_factor);
-    fs::create_directories(models);
+    make_folder(models);
     for (const bool before : {true, false}) import_epoch(colmap, before, focal_factor, database);
     colmap.run({"matches_importer", "--database_path", database, "--match_list_path",
                 (folder_ / "matches.txt").string(), "--match_type", "raw", "--SiftMatching.use_gpu",
@@ -178,7 +180,7 @@ class Mapper {
     if (status != 0) return std::nullopt;  // it found nothing
     std::optional<fs::path> best;
     size_t most = 0;
-    for (int i = 0; fs::exists(models / std::to_string(i) / "points3D.bin"); ++i) {
+    for (int i = 0; exists_at(models / std::to_string(i) / "points3D.bin"); ++i) {
       const size_t views = read_colmap_model(models / std::to_string(i)).views.size();
       if (views <= most) continue;
       most = views;
@@ -249,7 +251,7 @@ class Mapper {
 SparseMatches find_matches(const std::vector<Image>& images, const SfmOptions& options,
                            const fs::path& scratch, ProgressSink& progress) {
   const fs::path kept = scratch / "matches.npz";
-  if (fs::exists(kept)) return read_matches(kept);
+  if (exists_at(kept)) return read_matches(kept);
   SparseMatches matches;
   {
     ProgressStage stage(progress, "key points");
@@ -267,7 +269,7 @@ SfmModel find_model(const SfmPhotos& photos, const std::vector<ColmapPhoto>& lis
                     const SparseMatches& matches, const SfmOptions& options,
                     const fs::path& scratch, ProgressSink& progress) {
   const fs::path kept = scratch / "model";
-  if (!fs::exists(kept)) {
+  if (!exists_at(kept)) {
     ProgressStage stage(progress, "structure from motion");
     constexpr double kEnough = 0.9;
     const Mapper mapper(photos, listed, matches, options, scratch / "colmap");
@@ -283,10 +285,10 @@ SfmModel find_model(const SfmPhotos& photos, const std::vector<ColmapPhoto>& lis
       if (static_cast<double>(views) >= kEnough * static_cast<double>(listed.size())) break;
     }
     const fs::path empty = scratch / "colmap" / "none";
-    fs::create_directories(empty);
-    fs::rename(best ? *best : empty, kept);
+    make_folder(empty);
+    move_to(best ? *best : empty, kept);
   }
-  return fs::is_empty(kept) ? SfmModel{} : read_colmap_model(kept);
+  return list_folder(kept).empty() ? SfmModel{} : read_colmap_model(kept);
 }
 
 }  // namespace
@@ -314,7 +316,7 @@ void require_colmap() { require_program("colmap", kRemedy); }
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const fs::path& scratch, ProgressSink& progress) {
   options.validate();
-  fs::create_directories(scratch);
+  make_folder(scratch);
   check(photos.exif.size() == photos.images.size(), "structure_from_motion: EXIF of each photo");
   const std::vector<ColmapPhoto> listed = colmap_photos(photos);
   const std::vector<std::string> names = names_of(listed);

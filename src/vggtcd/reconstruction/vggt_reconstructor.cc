@@ -9,6 +9,7 @@
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/nn/product_rate.h"
@@ -161,7 +162,7 @@ std::string VggtReconstructor::fingerprint() const {
   const auto size = std::filesystem::file_size(options_.weights, failed);
   const auto time = std::filesystem::last_write_time(options_.weights, failed);
   return fmt::format("vggt 2; weights {} {} {}; keyframes {}; side {}; precision {}",
-                     std::filesystem::absolute(options_.weights).string(), failed ? 0 : size,
+                     absolute_path(options_.weights).string(), failed ? 0 : size,
                      time.time_since_epoch().count(), options_.keyframes, options_.frame_side_px,
                      enum_to_string(resolve_precision(options_.network.precision)));
 }
@@ -253,7 +254,7 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
   Passes passes(options_, progress);
   const auto epoch = [&](const char* name, const char* file, const EpochPhotos& of,
                          const Frames& frames) {
-    if (of.given || std::filesystem::exists(folder / file)) return;
+    if (of.given || exists_at(folder / file)) return;
     write_reconstruction(folder / file, passes.run(name, frames));
   };
   epoch("before", kBeforeFile, photos.before, before);
@@ -261,7 +262,7 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
   JointReconstruction joint;
   joint.keyframes_t1 = select_keyframes(static_cast<int>(before.images.size()), options_.keyframes);
   joint.keyframes_t2 = select_keyframes(static_cast<int>(after.images.size()), options_.keyframes);
-  if (!std::filesystem::exists(folder / kJointFile)) {
+  if (!exists_at(folder / kJointFile)) {
     Frames keyframes;
     append_keyframes(before, joint.keyframes_t1, keyframes);
     append_keyframes(after, joint.keyframes_t2, keyframes);

@@ -9,6 +9,8 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/failure.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/image_file.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/npz.h"
@@ -129,7 +131,7 @@ void read_labels(const NpzReader& npz, const std::string& key, ReportEpoch& epoc
 
 // The left part of an overlay is the photo, each pixel overlay_zoom() times as large.
 Image read_photo(const fs::path& overlay, int width, int height) {
-  if (!fs::exists(overlay)) return {};
+  if (!exists_at(overlay)) return {};
   const Image whole = read_image(overlay);
   const int zoom = overlay_zoom(width, height);
   if (whole.width < zoom * width || whole.height < zoom * height) {
@@ -158,17 +160,17 @@ std::function<Image(int)> photo_reader(const fs::path& overlays, const ReportEpo
 
 }  // namespace
 
-ReportInput read_results(const fs::path& directory) {
+ReportInput read_results(const fs::path& directory) try {
   const fs::path summary_path = directory / "summary.json";
-  if (!fs::exists(summary_path)) {
+  if (!exists_at(summary_path)) {
     throw_error(ErrorCode::kInput,
                 "{}: expected a result directory of vggt-cd detect, found no summary.json",
                 directory.string());
   }
   ReportInput input;
   input.summary = read_json_file(summary_path);
-  if (fs::exists(directory / "sim3.json")) input.sim3 = read_json_file(directory / "sim3.json");
-  if (const fs::path list = directory / "changes.json"; fs::exists(list)) {
+  if (exists_at(directory / "sim3.json")) input.sim3 = read_json_file(directory / "sim3.json");
+  if (const fs::path list = directory / "changes.json"; exists_at(list)) {
     input.changes = json_member(read_json_file(list), "changes", list.string());
   }
   const Json& change = json_member(input.summary, "change", summary_path.string());
@@ -192,6 +194,8 @@ ReportInput read_results(const fs::path& directory) {
   read_epoch("before", "t1", "before_aligned.ply", input.before);
   read_epoch("after", "t2", "after.ply", input.after);
   return input;
+} catch (...) {
+  rethrow_naming(directory);
 }
 
 }  // namespace vggtcd

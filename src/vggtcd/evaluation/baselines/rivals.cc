@@ -8,6 +8,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/evaluation/baselines/open3d_plugin.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
 
@@ -55,10 +56,7 @@ struct Points {
 
 }  // namespace
 
-bool rivals_available() {
-  std::error_code error;
-  return std::filesystem::exists(plugin_path(), error);
-}
+bool rivals_available() { return exists_at(plugin_path()); }
 
 void load_rivals() { load_plugin(); }
 

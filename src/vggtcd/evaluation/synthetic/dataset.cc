@@ -8,6 +8,7 @@
 #include "vggtcd/evaluation/synthetic/truth_file.h"
 #include "vggtcd/geometry/umeyama.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/image_write.h"
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/predictions.h"
@@ -20,14 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kEpochFolder[] = {"before", "after"};
-
-void make_directory(const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) {
-    throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", path.string(), error.message());
-  }
-}
 
 // The pass's own fit to the world: every 7th confident pixel of unchanged surface.
 Sim3 world_from_pass(const EpochTruth& truth, const Reconstruction& pass) {
@@ -57,14 +50,10 @@ void write_wat(const fs::path& root, const fs::path& photos, const SyntheticScen
   std::vector<ColoredPoint> points;
   for (const Epoch which : kEpochs) {
     const char* folder = kEpochFolder[static_cast<int>(which)];
-    make_directory(base / "images" / folder);
+    make_folder(base / "images" / folder);
     const EpochTruth& epoch = truth.of(which);
     for (const View& view : epoch.views) {
-      std::error_code error;
-      fs::copy_file(photos / folder / view.name, base / "images" / folder / view.name, error);
-      if (error) {
-        throw_error(ErrorCode::kOutput, "{}: {}", (base / "images").string(), error.message());
-      }
+      copy_unless_there(photos / folder / view.name, base / "images" / folder / view.name);
       views.push_back({view.camera_from_world, scaled_pinhole(view.pinhole, photo_scale),
                        std::string(folder) + "/" + view.name});
     }
@@ -81,7 +70,7 @@ void write_wat(const fs::path& root, const fs::path& photos, const SyntheticScen
            {epoch.color[3 * pixel], epoch.color[3 * pixel + 1], epoch.color[3 * pixel + 2]}});
     }
   }
-  make_directory(base / "sparse" / "0");
+  make_folder(base / "sparse" / "0");
   write_colmap_binary(base / "sparse" / "0", views, points);
 }
 

@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
+#include <new>
 
 #include "vggtcd/core/error.h"
 
@@ -59,7 +60,10 @@ struct RayCaster::Implementation {
   Implementation(const SyntheticScene& scene_in, Epoch epoch) : scene(scene_in) {
     collect(epoch);
     device = rtcNewDevice("threads=1,isa=sse4.2");
-    if (device == nullptr) throw_error(ErrorCode::kUnavailable, "embree: no device");
+    if (device == nullptr) {
+      if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+      throw_error(ErrorCode::kUnavailable, "embree: no device");
+    }
     embree = rtcNewScene(device);
     rtcSetSceneFlags(embree, RTC_SCENE_FLAG_ROBUST);
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -69,6 +73,7 @@ struct RayCaster::Implementation {
     auto* index_buffer = static_cast<uint32_t*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                 3 * sizeof(uint32_t), corners.size()));
+    if (vertex_buffer == nullptr || index_buffer == nullptr) throw std::bad_alloc();
     for (size_t k = 0; k < positions.size(); ++k) {
       for (int axis = 0; axis < 3; ++axis) *vertex_buffer++ = positions[k][axis];
     }
@@ -79,7 +84,9 @@ struct RayCaster::Implementation {
     rtcAttachGeometry(embree, geometry);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(embree);
-    check(rtcGetDeviceError(device) == RTC_ERROR_NONE, "embree: scene could not be built");
+    const RTCError error = rtcGetDeviceError(device);
+    if (error == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+    check(error == RTC_ERROR_NONE, "embree: scene could not be built");
   }
   ~Implementation() {
     if (embree != nullptr) rtcReleaseScene(embree);
