@@ -107,19 +107,19 @@ T load(const char* from) {
   return value;
 }
 
-float read_value(const Property& property, const char* record) {
+double read_value(const Property& property, const char* record) {
   const char* from = record + property.offset;
   switch (property.kind) {
     case 'u':
       if (property.size == 1) return load<uint8_t>(from);
       if (property.size == 2) return load<uint16_t>(from);
-      return static_cast<float>(load<uint32_t>(from));
+      return load<uint32_t>(from);
     case 'i':
       if (property.size == 1) return load<int8_t>(from);
       if (property.size == 2) return load<int16_t>(from);
-      return static_cast<float>(load<int32_t>(from));
+      return load<int32_t>(from);
     default:
-      return property.size == 4 ? load<float>(from) : static_cast<float>(load<double>(from));
+      return property.size == 4 ? static_cast<double>(load<float>(from)) : load<double>(from);
   }
 }
 
@@ -181,7 +181,8 @@ size_t PlyReader::size() const { return static_cast<size_t>(layout_->header.num_
 const std::vector<std::string>& PlyReader::fields() const { return layout_->fields; }
 
 void PlyReader::read(std::span<const std::string> fields,
-                     const std::function<void(const PlyCloud& block)>& sink) const {
+                     const std::function<void(const PlyCloud& block)>& sink,
+                     const Eigen::Vector3d& origin) const {
   const Layout& layout = *layout_;
   const size_t record_bytes = layout.header.record_bytes;
   const bool has_color = layout.color[0] != nullptr;
@@ -207,11 +208,13 @@ void PlyReader::read(std::span<const std::string> fields,
     for (size_t i = 0; i < points; ++i) {
       const char* record = &records[i * record_bytes];
       for (size_t k = 0; k < 3; ++k) {
-        block.positions[i][static_cast<Eigen::Index>(k)] = read_value(*layout.position[k], record);
+        const auto axis = static_cast<Eigen::Index>(k);
+        block.positions[i][axis] =
+            static_cast<float>(read_value(*layout.position[k], record) - origin[axis]);
         if (has_color) block.rgb[3 * i + k] = static_cast<uint8_t>(record[layout.color[k]->offset]);
       }
       for (size_t k = 0; k < wanted.size(); ++k) {
-        block.fields[k].values[i] = read_value(*wanted[k], record);
+        block.fields[k].values[i] = static_cast<float>(read_value(*wanted[k], record));
       }
     }
     sink(block);

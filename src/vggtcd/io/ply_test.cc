@@ -54,6 +54,35 @@ TEST(PlyWriter, WritesTheHeaderAndRecordsThatViewersExpect) {
   EXPECT_EQ(number(23), 0.5f);
 }
 
+TEST(PlyWriter, FarFromTheOriginPositionsAreDoubles) {
+  const TemporaryDirectory directory;
+  const Eigen::Vector3d origin(691234, 5334321, 512.5);
+  const Eigen::Vector3f position(0.001f, -1.25f, 3.5f);
+  {
+    PlyWriter ply(directory / "a.ply", 1, {"changed"}, {}, origin);
+    const uint8_t rgb[] = {1, 2, 3};
+    const float values[] = {1.0f};
+    ply.add(position, rgb, values);
+    ply.commit();
+  }
+  const std::string bytes = file_bytes(directory / "a.ply");
+  EXPECT_THAT(bytes, HasSubstr("property double x\nproperty double y\nproperty double z\n"));
+  double y = 0;
+  std::memcpy(&y, bytes.data() + bytes.find("end_header\n") + 11 + 8, sizeof(y));
+  EXPECT_EQ(y, 5334319.75);
+  const PlyReader reader(directory / "a.ply");
+  int blocks = 0;
+  reader.read(
+      {},
+      [&](const PlyCloud& block) {
+        ++blocks;
+        EXPECT_LT((block.positions[0] - position).norm(), 1e-8f);
+        EXPECT_THAT(block.rgb, ElementsAre(1, 2, 3));
+      },
+      origin);
+  EXPECT_EQ(blocks, 1);
+}
+
 TEST(ReadPly, ReadsBackWhatWasWritten) {
   const TemporaryDirectory directory;
   write_three_points(directory / "a.ply");
