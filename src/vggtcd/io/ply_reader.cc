@@ -9,6 +9,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
 #include "vggtcd/io/ply.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -69,21 +70,23 @@ Header read_header(std::istream& file, const std::string& what) {
     std::string keyword, type, name;
     words >> keyword >> type >> name;
     if (keyword == "end_header") break;
-    if (keyword == "format" && type != "binary_little_endian") throw_not_ply(what, type + " data");
+    if (keyword == "format" && type != "binary_little_endian")
+      throw_not_ply(what, quote(type) + " data");
     if (keyword == "element") {
       after = after || vertices;
       vertices = type == "vertex";
-      if (!vertices && !after) throw_not_ply(what, "an element " + type + " before the vertices");
+      if (!vertices && !after)
+        throw_not_ply(what, "an element " + quote(type) + " before the vertices");
       const auto count = number_in<int64_t>(name);
       if (vertices && (after || !count)) {
-        throw_not_ply(what, "a broken header line: " + line.substr(0, 80));
+        throw_not_ply(what, "a broken header line: " + quote(line));
       }
       if (vertices) header.num_points = *count;
     }
     if (keyword == "property" && vertices) {
       Property property{name};
       if (!set_type(property, type) || header.find(name) != nullptr) {
-        throw_not_ply(what, "an unusable property: " + line.substr(0, 80));
+        throw_not_ply(what, "an unusable property: " + quote(line));
       }
       property.offset = header.record_bytes;
       header.record_bytes += property.size;

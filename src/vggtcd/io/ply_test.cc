@@ -154,7 +154,7 @@ TEST(ReadPly, RefusesOtherAndDamagedFiles) {
   const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
   expect("", "found a truncated header");
   expect("obj\n", "found another file");
-  expect("ply\nformat ascii 1.0\nend_header\n", "found ascii data");
+  expect("ply\nformat ascii 1.0\nend_header\n", R"(found "ascii" data)");
   expect(start + "element vertex 2\n", "found a truncated header");
   expect(start + "end_header\n", "found no vertices with x, y and z");
   expect(start + "element vertex 2\nproperty float x\nend_header\n", "found no vertices");

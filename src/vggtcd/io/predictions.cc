@@ -5,7 +5,6 @@
 
 #include <fmt/ranges.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,8 +16,6 @@
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/pose_matrix.h"
 #include "vggtcd/io/prediction_layout.h"
-#include "vggtcd/scene/local_frame.h"
-#include "vggtcd/scene/stray_depths.h"
 
 namespace vggtcd {
 namespace {
@@ -138,39 +135,24 @@ std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout
   return names;
 }
 
-// The centre of a camera as the file has it. Poses are made exact rotations on reading; where the
-// origin is far away that alone would move the camera.
-Eigen::Vector3d center_in_file(std::span<const double> pose, bool world_from_camera) {
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> top(pose.data());
-  const Eigen::Matrix3d axes = top.leftCols<3>();
-  return world_from_camera ? Eigen::Vector3d(top.col(3)) : -(axes.inverse() * top.col(3));
-}
-
-struct Cameras {
-  std::vector<View> views;
-  std::vector<Eigen::Vector3d> centers;  // in the file's world
-};
-
-Cameras read_cameras(const NpzReader& npz, const PredictionLayout& layout) {
+std::vector<View> read_views(const NpzReader& npz, const PredictionLayout& layout) {
   const std::vector<double> poses = npz.read<double>(layout.poses);
   const std::vector<double> intrinsics = npz.read<double>(layout.intrinsics);
   const std::vector<std::string> names = read_names(npz, layout);
   const size_t frames = static_cast<size_t>(layout.frames);
   const size_t stride = frames == 0 ? 12 : poses.size() / frames;
-  Cameras cameras{std::vector<View>(frames), {}};
-  std::vector<View>& views = cameras.views;
+  std::vector<View> views(frames);
   for (size_t i = 0; i < frames; ++i) {
     const auto where = [&](const std::string& key) {
       return fmt::format("{}: {}: frame {}", npz.name(), key, i);
     };
-    const std::span<const double> values = std::span(poses).subspan(i * stride, stride);
-    const Rigid3 pose = internal::pose_from_matrix(values, where(layout.poses));
-    cameras.centers.push_back(center_in_file(values, layout.world_from_camera));
+    const Rigid3 pose = internal::pose_from_matrix(std::span(poses).subspan(i * stride, stride),
+                                                   where(layout.poses));
     views[i].camera_from_world = layout.world_from_camera ? pose.inverse() : pose;
     views[i].pinhole = read_pinhole(intrinsics.data() + i * 9, layout, where(layout.intrinsics));
     views[i].name = names[i];
   }
-  return cameras;
+  return views;
 }
 
 void read_confidence(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result,
@@ -203,9 +185,10 @@ constexpr float kLargestConfidence = 1e30f;
 // After this, depth is >= 0 and finite, and confidence can be ranked.
 void drop_invalid_pixels(const std::string& name, Reconstruction& result, ProgressSink& progress) {
   size_t bad_pixels = 0, bad_depth = 0, bad_confidence = 0;
-  bool any = false;
+  std::vector<std::string> empty_frames;
   for (int frame = 0; frame < result.num_frames(); ++frame) {
     const size_t begin = static_cast<size_t>(frame) * result.pixels_per_frame();
+    bool any = false;
     for (size_t i = begin; i < begin + result.pixels_per_frame(); ++i) {
       float& depth = result.depth[i];
       float& confidence = result.confidence[i];
@@ -220,8 +203,9 @@ void drop_invalid_pixels(const std::string& name, Reconstruction& result, Progre
       if (!good_confidence) confidence = 0;
       any |= depth > 0;
     }
+    if (!any) empty_frames.push_back(result.views[static_cast<size_t>(frame)].name);
   }
-  if (!any) {
+  if (empty_frames.size() == result.views.size()) {
     const bool confidence = bad_confidence > bad_depth;
     throw_error(ErrorCode::kInput, "{}: {}: expected {} numbers, found none in any of {} frames",
                 name, confidence ? "confidence" : "depth", confidence ? "finite" : "positive",
@@ -232,29 +216,6 @@ void drop_invalid_pixels(const std::string& name, Reconstruction& result, Progre
         "{}: {} of {} pixels are ignored: depth is NaN, infinite or negative in {}, confidence is "
         "NaN in {}",
         name, bad_pixels, result.num_pixels(), bad_depth, bad_confidence));
-  }
-}
-
-// One pixel must not decide where the scene ends.
-void drop_strays(const std::string& name, Reconstruction& result, ProgressSink& progress) {
-  const StrayDepths strays = drop_stray_depths(result);
-  if (strays.count() == 0) return;
-  progress.notice(
-      fmt::format("{}: {} of {} pixels are ignored: their depth is far from all others, {:.3g} to "
-                  "{:.3g}, and so "
-                  "no part of the scene: {} beyond, {} before",
-                  name, strays.count(), result.num_pixels(), strays.nearest, strays.farthest,
-                  strays.too_far, strays.too_near));
-}
-
-void name_empty_frames(const std::string& name, const Reconstruction& result,
-                       ProgressSink& progress) {
-  std::vector<std::string> empty_frames;
-  for (int frame = 0; frame < result.num_frames(); ++frame) {
-    if (std::ranges::any_of(result.frame_depth(frame), [](float depth) { return depth > 0; })) {
-      continue;
-    }
-    empty_frames.push_back(result.views[static_cast<size_t>(frame)].name);
   }
   if (!empty_frames.empty()) {
     progress.notice(fmt::format("{}: frames without any valid depth are skipped: {}", name,
@@ -318,26 +279,6 @@ void read_colors(const NpzReader& npz, const PredictionLayout& layout, Reconstru
   });
 }
 
-// The difference between a number and the next one of its size, for the type that it is stored in.
-double resolution_of(const NpyHeader& header) {
-  return std::ldexp(1.0, header.item_size >= 8 ? -52 : header.item_size >= 4 ? -23 : -10);
-}
-
-// Into a local frame, where the file's origin is far away (scene/local_frame.h).
-void move_near(const NpzReader& npz, const PredictionLayout& layout,
-               std::span<const Eigen::Vector3d> centers, Reconstruction& result,
-               ProgressSink& progress) {
-  use_local_frame(result, centers);
-  const double distance = result.origin_in_world.cwiseAbs().maxCoeff();
-  const double step = distance * resolution_of(npz.header(layout.poses));
-  constexpr double kFine = 1e-4;  // of the scene
-  if (step <= kFine * scene_size(result, centers).size) return;
-  progress.notice(fmt::format(
-      "{}: {}: {}-bit numbers tell positions {:.3g} away from the origin apart by {:.2g} only; "
-      "save poses as 64-bit numbers, or relative to a place nearby",
-      npz.name(), layout.poses, 8 * npz.header(layout.poses).item_size, distance, step));
-}
-
 void check_limits(const NpzReader& npz, const PredictionLayout& layout, int min_frames) {
   if (layout.frames < min_frames) {
     throw_error(ErrorCode::kDegenerate, "{}: expected at least {} frames, found {}", npz.name(),
@@ -363,18 +304,16 @@ Reconstruction read_arrays(const NpzReader& npz, ProgressSink& progress, int min
   Reconstruction result;
   result.height = static_cast<int>(layout.height);
   result.width = static_cast<int>(layout.width);
-  Cameras cameras = read_cameras(npz, layout);
-  result.views = std::move(cameras.views);
+  result.views = read_views(npz, layout);
   result.depth.resize(result.num_pixels());
   npz.read_into<float>("depth", result.depth);
   read_confidence(npz, layout, result, progress);
   apply_mask(npz, layout, result);
   drop_invalid_pixels(npz.name(), result, progress);
-  drop_strays(npz.name(), result, progress);
-  name_empty_frames(npz.name(), result, progress);
+  internal::drop_strays(npz.name(), result, progress);
   internal::verify_poses(npz, layout, result, progress);
-  move_near(npz, layout, cameras.centers, result, progress);
   read_colors(npz, layout, result, progress);
+  internal::move_near(npz, layout, result, progress);
   check_consistent(result);
   return result;
 }
