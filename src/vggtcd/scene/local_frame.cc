@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <vector>
 
 #include "vggtcd/core/error.h"
@@ -37,18 +38,20 @@ Eigen::Vector3d local_origin(const Eigen::Vector3d& middle, double size) {
 
 SceneSize scene_size(const Reconstruction& reconstruction,
                      std::span<const Eigen::Vector3d> camera_centers) {
-  check(!camera_centers.empty(), "scene_size: cameras");
+  std::vector<Eigen::Vector3d> known;
+  std::ranges::copy_if(camera_centers, std::back_inserter(known),
+                       [](const Eigen::Vector3d& center) { return center.allFinite(); });
   SceneSize scene;
+  scene.size = median_depth(reconstruction);
+  if (known.empty()) return scene;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
-    for (const Eigen::Vector3d& center : camera_centers) values.push_back(center[axis]);
+    for (const Eigen::Vector3d& center : known) values.push_back(center[axis]);
     scene.middle[axis] = middle_of(std::move(values));
   }
   std::vector<double> distances;
-  for (const Eigen::Vector3d& center : camera_centers) {
-    distances.push_back((center - scene.middle).norm());
-  }
-  scene.size = middle_of(std::move(distances)) + median_depth(reconstruction);
+  for (const Eigen::Vector3d& center : known) distances.push_back((center - scene.middle).norm());
+  scene.size += middle_of(std::move(distances));
   return scene;
 }
 
@@ -60,6 +63,7 @@ void use_local_frame(Reconstruction& reconstruction,
   if (origin.isZero(0)) return;
   reconstruction.origin_in_world = origin;
   for (size_t i = 0; i < camera_centers.size(); ++i) {
+    if (!camera_centers[i].allFinite()) continue;
     Rigid3& pose = reconstruction.views[i].camera_from_world;
     pose.translation = -(pose.rotation * (camera_centers[i] - origin));
   }

@@ -17,7 +17,7 @@ namespace vggtcd {
 Eigen::Vector3d local_origin(const Eigen::Vector3d& middle, double size);
 
 // The size that a scene counts as for that: the median distance of the cameras from their middle
-// (per axis the median) and the median depth.
+// (per axis the median) and the median depth. Centres that are not finite do not count.
 struct SceneSize {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   double size = 0;
