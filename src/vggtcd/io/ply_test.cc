@@ -154,15 +154,18 @@ TEST(ReadPly, RefusesOtherAndDamagedFiles) {
   const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
   expect("", "found a truncated header");
   expect("obj\n", "found another file");
+  expect("ply\nformat " + std::string(5000, '\x1b') + " 1.0\nend_header\n", "found \"\\x1b\\x1b");
   expect("ply\nformat ascii 1.0\nend_header\n", R"(found "ascii" data)");
   expect(start + "element vertex 2\n", "found a truncated header");
   expect(start + "end_header\n", "found no vertices with x, y and z");
   expect(start + "element vertex 2\nproperty float x\nend_header\n", "found no vertices");
-  expect(start + "element vertex 2x\n" + xyz, "found a broken header line: element vertex 2x");
-  expect(start + "element vertex two\n" + xyz, "found a broken header line: element vertex two");
+  expect(start + "element vertex 2x\n" + xyz, "found a broken header line: \"element vertex 2x\"");
+  expect(start + "element vertex two\n" + xyz,
+         "found a broken header line: \"element vertex two\"");
   expect(start + "element vertex 2\nproperty float x\n" + xyz, "found an unusable property");
   expect(start + "element vertex 2\nproperty list uchar int x\n" + xyz, "an unusable property");
-  expect(start + "element face 2\nelement vertex 2\n" + xyz, "an element face before the vertices");
+  expect(start + "element face 2\nelement vertex 2\n" + xyz,
+         "an element \"face\" before the vertices");
   expect(start + "element vertex 2\n" + xyz + std::string(23, 'a'),
          "expected 2 points of 12 bytes, found 23 bytes; truncated");
   expect(start + "element vertex 9000000000000000000\n" + xyz, "truncated");
