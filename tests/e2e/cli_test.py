@@ -8,6 +8,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import struct
@@ -459,6 +460,123 @@ class Metres(unittest.TestCase):
             self.assertEqual(len(lines), 1, done.stderr)
             self.assertIn(word, lines[0])
             self.assertFalse(out.exists())
+
+
+class Numbers(unittest.TestCase):
+    """Neither a stray pixel nor the unit nor the origin of a prediction decides what has changed."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.temporary.name)
+        cls.inputs = {name: dict(np.load(EXAMPLE / f"{name}.npz")) for name in ("t1", "t2", "joint")}
+        cls.plain = cls.root / "plain"
+        done = cls.detect(cls.plain, cls.inputs)
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    @classmethod
+    def detect(cls, out, inputs, *arguments, joint=True):
+        for name, arrays in inputs.items():
+            np.savez(cls.root / f"{name}.npz", **arrays)
+        return run("detect", cls.root / "t1.npz", cls.root / "t2.npz",
+                   *(["--joint", cls.root / "joint.npz"] if joint else []), *arguments, "-o", out, "--no-overlays")
+
+    def expect_same(self, out, other, done):
+        """As a random choice of other point pairs would leave it."""
+        self.assertEqual(done.returncode, 0, done.stderr)
+        change, expected = (json.loads((path / "summary.json").read_text())["change"] for path in (out, other))
+        for epoch in ("t1", "t2"):
+            self.assertAlmostEqual(change[epoch]["points"], expected[epoch]["points"], delta=5)
+            self.assertAlmostEqual(change[epoch]["changed_share"], expected[epoch]["changed_share"], delta=2e-3)
+
+    def test_one_pixel_decides_nothing(self):
+        for depth in (10, 1e8, 1e30, 1e-30):
+            arrays = {key: array.copy() for key, array in self.inputs["t1"].items()}
+            arrays["depth"] = arrays["depth"].astype("f4")
+            arrays["depth_conf"] = arrays["depth_conf"].astype("f4")
+            arrays["depth"][2, 5, 100], arrays["depth_conf"][2, 5, 100] = depth, 2 * arrays["depth_conf"].max()
+            out = self.root / f"pixel_{depth}"
+            done = self.detect(out, {**self.inputs, "t1": arrays})
+            self.expect_same(out, self.plain, done)
+            self.assertIn("t1.npz: 1 of 188496 pixels are ignored: their depth is far", done.stderr)
+
+    def test_the_unit_means_nothing(self):
+        for unit in (1e-9, 1e-6, 1e9):
+            inputs = {}
+            for name, arrays in self.inputs.items():
+                inputs[name] = {**arrays, "depth": (arrays["depth"].astype("f8") * unit).astype("f4"),
+                                "extrinsic": arrays["extrinsic"] * np.array([1, 1, 1, unit])}
+            out = self.root / f"unit_{unit}"
+            self.expect_same(out, self.plain, self.detect(out, inputs))
+            sim3, expected = (json.loads((path / "sim3.json").read_text()) for path in (out, self.plain))
+            self.assertAlmostEqual(sim3["scale"], expected["scale"], delta=1e-3)
+
+    def in_one_frame(self, origin):
+        """Both epochs in T2's frame, whose origin is moved."""
+        sim3 = json.loads((self.plain / "sim3.json").read_text())
+        scale, rotation, translation = sim3["scale"], np.array(sim3["rotation"]), np.array(sim3["translation"])
+        inputs = {}
+        for name in ("t1", "t2"):
+            arrays = {key: array.copy() for key, array in self.inputs[name].items()}
+            arrays["extrinsic"] = arrays["extrinsic"].astype("f8")
+            for pose in arrays["extrinsic"]:
+                turn = np.linalg.svd(pose[:, :3])
+                turn, center = turn[0] @ turn[2], -pose[:, :3].T @ pose[:, 3]
+                if name == "t1":
+                    turn, center = turn @ rotation.T, scale * rotation @ center + translation
+                pose[:, :3], pose[:, 3] = turn, -turn @ (center + origin)
+            arrays["depth"] = arrays["depth"].astype("f4") * np.float32(scale if name == "t1" else 1)
+            inputs[name] = arrays
+        return inputs
+
+    def test_the_origin_means_nothing(self):
+        origins = {"near": np.zeros(3), "far": np.array([691234.0, 5334321.0, 512.0])}
+        for name, origin in origins.items():
+            done = self.detect(self.root / name, self.in_one_frame(origin), "--aligned", joint=False)
+            self.expect_same(self.root / name, self.root / "near", done)
+        # Floats at the scene's size; T1 also moved by the refinement, whose static set differs by a few points.
+        for name, tolerance in (("before_aligned.ply", 1e-4), ("after.ply", 1e-6)):
+            near, far = (read_ply(self.root / place / name) for place in origins)
+            self.assertEqual((near["x"].dtype, far["x"].dtype), (np.float32, np.float64))
+            self.assertEqual(len(near), len(far))
+            for axis, offset in zip("xyz", origins["far"]):
+                np.testing.assert_allclose(far[axis] - offset, near[axis], atol=tolerance)
+        cameras = [np.loadtxt(self.root / place / "cameras_after.tum") for place in origins]
+        np.testing.assert_allclose(cameras[1][:, 1:4] - origins["far"], cameras[0][:, 1:4], atol=1e-7)
+        sim3 = json.loads((self.root / "far" / "sim3.json").read_text())
+        moved = sim3["scale"] * np.array(sim3["rotation"]) @ origins["far"] + sim3["translation"] - origins["far"]
+        self.assertLess(np.linalg.norm(moved), 0.1)
+        things = [json.loads((self.root / place / "changes.json").read_text())["changes"] for place in origins]
+        np.testing.assert_allclose(np.array(things[1][0]["center"]) - origins["far"], things[0][0]["center"], atol=0.01)
+
+    def test_a_reference_far_away_keeps_millimetres(self):
+        poses = np.load(EXAMPLE / "truth.npz")
+        origins = {"local": np.zeros(3), "utm": np.array([500123.0, 4649776.0, 100.0])}
+        clouds = []
+        for name, origin in origins.items():
+            with open(self.root / f"{name}.csv", "w") as table:
+                for epoch, key in (("before", "extrinsic_t1"), ("after", "extrinsic_t2")):
+                    for number, pose in enumerate(poses[key]):
+                        center = -pose[:, :3].T @ pose[:, 3] + origin
+                        table.write(f"{epoch}/{number:04d}.jpg,{center[0]:.4f},{center[1]:.4f},{center[2]:.4f}\n")
+            done = self.detect(self.root / f"at_{name}", self.inputs, "--reference", self.root / f"{name}.csv")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            clouds.append(read_ply(self.root / f"at_{name}" / "after.ply"))
+        for axis, offset in zip("xyz", origins["utm"]):
+            np.testing.assert_allclose(clouds[1][axis] - offset, clouds[0][axis], atol=1e-3)
+        # The page is drawn about a place nearby.
+        page = (self.root / "at_utm" / "report.html").read_text()
+        data = json.loads(re.search(r'id="report-data">(.*?)</script>', page, re.S)[1])
+        summary = json.loads((self.root / "at_utm" / "summary.json").read_text())
+        self.assertEqual(data["origin"], summary["change"]["origin_m"])
+        for cloud in data["clouds"]:
+            self.assertLess(np.abs(cloud["box_min"]).max(), 50)
+        for thing in data["changes"]:
+            self.assertLess(np.abs(thing["center"]).max(), 50)
 
 
 class Explain(unittest.TestCase):

@@ -50,6 +50,67 @@ void write_pictures(const fs::path& folder) {
   write(folder / "lossless", std::string(bytes.begin(), bytes.end()));
 }
 
+std::string part(const std::string& bytes) {
+  return std::string{static_cast<char>(bytes.size() & 255), static_cast<char>(bytes.size() >> 8)} +
+         bytes;
+}
+
+template <typename T>
+std::string raw(T value) {
+  return std::string(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+// A model of one camera, one image and one point.
+void write_colmap_seeds(const fs::path& folder) {
+  const std::string cameras = raw<uint64_t>(1) + raw<uint32_t>(1) + raw<int32_t>(1) +
+                              raw<uint64_t>(640) + raw<uint64_t>(480) + raw(500.0) + raw(500.0) +
+                              raw(320.0) + raw(240.0);
+  const std::string images = raw<uint64_t>(1) + raw<uint32_t>(7) + raw(1.0) + raw(0.0) + raw(0.0) +
+                             raw(0.0) + raw(0.5) + raw(-1.0) + raw(2.0) + raw<uint32_t>(1) +
+                             std::string("a.jpg\0", 6) + raw<uint64_t>(1) + raw(1.5) + raw(2.5) +
+                             raw<uint64_t>(3);
+  const std::string points = raw<uint64_t>(1) + raw<uint64_t>(3) + raw(1.0) + raw(2.0) + raw(3.0) +
+                             "rgb" + raw(0.5) + raw<uint64_t>(1) + raw<uint32_t>(7) +
+                             raw<uint32_t>(0);
+  write(folder / "binary", "b" + part(cameras) + part(images) + points);
+  write(folder / "text", "a" + part("# cameras\n1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n") +
+                             part("1 1 0 0 0 0.5 -1 2 1 a b.jpg\n1.5 2.5 3\n") +
+                             "3 1 2 3 10 20 30 0.5 1 0\n");
+}
+
+void write_table_seeds(const fs::path& folder) {
+  write(folder / "tum",
+        std::string(1, '\0') + "# a comment\n0.5 1 2 3 0 0 0 1\n1e0 -1 2e-3 3 0 0 0.6 0.8\n");
+  write(folder / "csv", "\1name;x;y;z\nbefore/a b.jpg;691234.5;5334321.25;1e2\nafter/3,1,2,3\n");
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 3, 4), }";
+  header += std::string(117 - header.size(), ' ') + "\n";
+  std::string npy = std::string("\x93NUMPY\1\0", 8) + raw<uint16_t>(118) + header;
+  for (const double value : {1., 0., 0., 4., 0., 1., 0., 5., 0., 0., 1., 6.}) npy += raw(value);
+  write(folder / "npy", "\2" + npy);
+}
+
+void write_ply_seeds(const fs::path& folder) {
+  const std::string start = "ply\nformat binary_little_endian 1.0\ncomment c\nelement vertex 2\n";
+  write(folder / "floats",
+        start +
+            "property float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+            "property uchar green\nproperty uchar blue\nproperty float scalar_a\nend_header\n" +
+            std::string(38, 'p'));
+  write(folder / "doubles",
+        start +
+            "property double x\nproperty double y\nproperty double z\nproperty short s\n"
+            "element face 0\nproperty list uchar int vertex_indices\nend_header\n" +
+            std::string(52, 'q'));
+}
+
+void write_json_seeds(const fs::path& folder) {
+  write(folder / "sim3",
+        R"({"scale":1.5,"rotation":[[0,-1,0],[1,0,0],[0,0,1]],"translation":[1e3,-2,0.5]})");
+  write(folder / "options",
+        R"({"flag":true,"many":-3,"seed":18446744073709551615,"share":1e308,"length":0.1,)"
+        R"("name":"\u00e9\n","kind":"other","inner":{"whole":2}})");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -77,5 +138,9 @@ int main(int argc, char** argv) {
         std::string("\x80\x04\x95\x0a\0\0\0\0\0\0\0}\x94\x8c\x01"
                     "a\x94K\x01s.",
                     22));
+  write_colmap_seeds(folder / "fuzz_colmap");
+  write_json_seeds(folder / "fuzz_json");
+  write_ply_seeds(folder / "fuzz_ply");
+  write_table_seeds(folder / "fuzz_tables");
   return 0;
 }

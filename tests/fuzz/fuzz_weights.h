@@ -4,18 +4,14 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <vector>
 
+#include "tests/fuzz/fuzz_files.h"
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/weight_file.h"
 
 namespace vggtcd::fuzz {
-
-inline void require(bool condition) {
-  if (!condition) std::abort();
-}
 
 inline void check_error(const Error& error) {
   require(error.code() == ErrorCode::kWeights);

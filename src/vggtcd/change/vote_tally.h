@@ -36,8 +36,10 @@ struct PointVotes {
   // Near photos weigh more, as 1 / z.
   void cast(const Testimony& said, const VoteScale& scale) {
     if (said.vote != Vote::kSees && said.vote != Vote::kLooksThrough) return;
+    // A point may be as near to the camera as it likes: bounded before it becomes an integer.
+    const float most = static_cast<float>(kMaxVoteWeight);
     const int steps =
-        std::clamp(static_cast<int>(scale.weight_steps_u / said.z + 0.5f), 1, kMaxVoteWeight);
+        std::max(1, static_cast<int>(std::min(scale.weight_steps_u / said.z + 0.5f, most)));
     const float w = static_cast<float>(steps);
     ++count;
     weight += steps;

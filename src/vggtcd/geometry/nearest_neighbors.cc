@@ -25,6 +25,52 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 using PointsOfBlock = std::array<IndexedPoint, kLanes>;
 static_assert(sizeof(PointsOfBlock) == sizeof(PointBlock));
 
+// Squares of distances fit into a float only for scenes of ordinary size. Others are searched
+// scaled by a power of two, which changes no digit.
+constexpr int kOrdinaryExponent = 40;
+constexpr int kLargestExponent = 126;  // 2^e and 2^-e are normal floats
+
+// The power of two that brings the coordinates of most points near 1; 0 where their size is
+// ordinary. By the median of a sample, which a stray does not decide.
+int exponent_of_scale(const PointSource& points) {
+  constexpr size_t kChunks = 4, kPointsOfAChunk = 256;
+  std::vector<float> sizes;
+  std::vector<Eigen::Vector3f> memory;
+  for (size_t c = 0; c < std::min(kChunks, points.num_chunks()); ++c) {
+    const auto chunk = points.chunk(c * points.num_chunks() / kChunks, memory);
+    const size_t stride = std::max<size_t>(1, chunk.size() / kPointsOfAChunk);
+    for (size_t i = 0; i < chunk.size(); i += stride) {
+      const float size = chunk[i].cwiseAbs().maxCoeff();
+      if (size > 0 && std::isfinite(size)) sizes.push_back(size);
+    }
+  }
+  if (sizes.empty()) return 0;
+  std::ranges::nth_element(sizes, sizes.begin() + std::ssize(sizes) / 2);
+  const int exponent = std::ilogb(sizes[sizes.size() / 2]);
+  if (std::abs(exponent) <= kOrdinaryExponent) return 0;
+  return std::clamp(-exponent, -kLargestExponent, kLargestExponent);
+}
+
+// Points times a power of two.
+class ScaledPoints : public PointSource {
+ public:
+  ScaledPoints(const PointSource& points, int exponent)
+      : points_(points), factor_(std::ldexp(1.0f, exponent)) {}
+  std::span<const size_t> starts() const override { return points_.starts(); }
+  std::span<const Eigen::Vector3f> chunk(size_t k,
+                                         std::vector<Eigen::Vector3f>& memory) const override {
+    const auto unscaled = points_.chunk(k, memory);
+    if (factor_ == 1) return unscaled;
+    if (unscaled.data() != memory.data()) memory.assign(unscaled.begin(), unscaled.end());
+    for (size_t i = 0; i < unscaled.size(); ++i) memory[i] *= factor_;
+    return std::span(memory).first(unscaled.size());
+  }
+
+ private:
+  const PointSource& points_;
+  float factor_;
+};
+
 LargeArray<PointBlock> make_blocks(const PointSource& points) {
   LargeArray<PointBlock> blocks((points.size() + kLanes - 1) / kLanes);
   if (blocks.empty()) return blocks;
@@ -93,6 +139,19 @@ LargeArray<BoxNode> make_level(const LargeArray<Child>& children) {
   return nodes;
 }
 
+LargeArray<PointBlock> scaled(const LargeArray<PointBlock>& blocks, int exponent) {
+  LargeArray<PointBlock> result(blocks.size());
+  parallel_for(static_cast<int64_t>(blocks.size()), 1024, [&](int64_t begin, int64_t end) {
+    for (size_t b = static_cast<size_t>(begin); b < static_cast<size_t>(end); ++b) {
+      result[b] = blocks[b];
+      for (float* axis : {result[b].x, result[b].y, result[b].z}) {
+        for (size_t lane = 0; lane < kLanes; ++lane) axis[lane] = std::ldexp(axis[lane], exponent);
+      }
+    }
+  });
+  return result;
+}
+
 // The least float whose root is above the bound, so that "less" on squares means "within the
 // bound".
 float squared_limit(float bound) {
@@ -122,18 +181,31 @@ Kernel kernel_for_this_processor() {
 
 struct NearestNeighborIndex::Impl {
   size_t size = 0;
+  int exponent = 0;  // blocks and levels are times 2^exponent
   LargeArray<PointBlock> blocks;
   std::vector<LargeArray<BoxNode>> levels;
 
-  explicit Impl(const PointSource& targets) : size(targets.size()), blocks(make_blocks(targets)) {
+  explicit Impl(const PointSource& targets)
+      : size(targets.size()),
+        exponent(exponent_of_scale(targets)),
+        blocks(make_blocks(ScaledPoints(targets, exponent))) {
     if (blocks.empty()) return;
     levels.push_back(make_level(blocks));
     while (levels.back().size() > 1) levels.push_back(make_level(levels.back()));
     check(levels.size() <= kMaxTreeLevels, "nearest neighbors: tree too high");
   }
 
+  // Queries are scaled as the targets are, the bound and the distances are not.
   void query(const LargeArray<PointBlock>& queries, float bound, std::span<float> distance,
              std::span<int32_t> index) const {
+    if (exponent == 0) return query_scaled(queries, bound, distance, index);
+    const float scaled_bound = std::ldexp(bound, exponent);
+    query_scaled(queries, scaled_bound, distance, index);
+    for (float& d : distance) d = d < scaled_bound ? std::ldexp(d, -exponent) : bound;
+  }
+
+  void query_scaled(const LargeArray<PointBlock>& queries, float bound, std::span<float> distance,
+                    std::span<int32_t> index) const {
     check(bound >= 0, "nearest neighbors: bound >= 0");
     check(index.empty() || index.size() == distance.size(),
           "nearest neighbors: one index per query or none");
@@ -167,13 +239,19 @@ size_t NearestNeighborIndex::size() const { return impl_->size; }
 void NearestNeighborIndex::query(std::span<const Eigen::Vector3f> queries, float bound,
                                  std::span<float> distance, std::span<int32_t> index) const {
   check(distance.size() == queries.size(), "nearest neighbors: one distance per query");
-  impl_->query(make_blocks(PointArray(queries)), bound, distance, index);
+  const PointArray points(queries);
+  impl_->query(make_blocks(ScaledPoints(points, impl_->exponent)), bound, distance, index);
 }
 
 void NearestNeighborIndex::query(const NearestNeighborIndex& queries, float bound,
                                  std::span<float> distance, std::span<int32_t> index) const {
   check(distance.size() == queries.size(), "nearest neighbors: one distance per query");
-  impl_->query(queries.impl_->blocks, bound, distance, index);
+  const Impl& others = *queries.impl_;
+  if (others.exponent == impl_->exponent) {
+    impl_->query(others.blocks, bound, distance, index);
+  } else {
+    impl_->query(scaled(others.blocks, impl_->exponent - others.exponent), bound, distance, index);
+  }
 }
 
 NearestNeighbors NearestNeighborIndex::query(std::span<const Eigen::Vector3f> queries,

@@ -28,8 +28,10 @@ struct NearestNeighbors {
 // dz dz) evaluated in float without fused operations, and "nearest" and "equally near" refer to
 // that number, so the result has the same bits for any number of threads and any instruction set.
 //
-// Positions are finite (Error{kInternal} otherwise: readers refuse NaN) and of magnitude below
-// 1e18, so that squares do not overflow; distances below 1e-19 are zero. At most 2^31 - 1 targets.
+// Positions are finite (Error{kInternal} otherwise: readers refuse NaN). Their unit may have any
+// size; against the size of most targets (against 1, if that lies between 1e-12 and 1e12) positions
+// are below 1e18, so that squares do not overflow, and distances below 1e-19 are zero. At most
+// 2^31 - 1 targets.
 class NearestNeighborIndex {
  public:
   static constexpr float kNoBound = std::numeric_limits<float>::infinity();

@@ -116,6 +116,43 @@ TEST_P(NearestNeighborsEverywhere, MatchBruteForceForEverySmallNumberOfPoints) {
   }
 }
 
+TEST_P(NearestNeighborsEverywhere, TheUnitMayHaveAnySize) {
+  const Points targets = surface_points(3'001, 11), queries = surface_points(501, 12);
+  const NearestNeighborIndex index(targets);
+  for (const float bound : {0.05f, kNoBound}) {
+    const NearestNeighbors expected = index.query(queries, bound);
+    // Powers of two change no digit; squares of the smallest and largest would not be floats.
+    for (const int exponent : {-110, -70, -41, 41, 70, 100}) {
+      const auto scaled = [&](Points points) {
+        for (Eigen::Vector3f& x : points) x *= std::ldexp(1.0f, exponent);
+        return points;
+      };
+      const NearestNeighborIndex scaled_index(scaled(targets));
+      NearestNeighbors found = scaled_index.query(scaled(queries), std::ldexp(bound, exponent));
+      for (float& d : found.distance) d = std::ldexp(d, -exponent);
+      EXPECT_EQ(found.distance, expected.distance) << exponent;
+      EXPECT_EQ(found.index, expected.index) << exponent;
+      scaled_index.query(NearestNeighborIndex(scaled(queries)), std::ldexp(bound, exponent),
+                         found.distance, found.index);
+      for (float& d : found.distance) d = std::ldexp(d, -exponent);
+      EXPECT_EQ(found.distance, expected.distance) << "index against index, " << exponent;
+    }
+  }
+}
+
+TEST(NearestNeighbors, ScenesOfTwoSizesAreHeldAgainstEachOther) {
+  // The targets are searched scaled, the queries' own index is not.
+  const Points targets = {{1e-20f, 0, 0}, {2e-20f, 0, 0}, {0, 3e-20f, 0}};
+  const Points queries = {{1.9e-20f, 0, 0}, {1, 0, 0}, {0, 2, 0}};
+  const NearestNeighborIndex index(targets), others(queries);
+  std::vector<float> distance(3);
+  std::vector<int32_t> nearest(3);
+  index.query(others, 1e-19f, distance, nearest);
+  EXPECT_EQ(nearest, (std::vector<int32_t>{1, -1, -1}));
+  EXPECT_NEAR(distance[0] * 1e21f, 1, 1e-5);
+  EXPECT_EQ(distance[1], 1e-19f);
+}
+
 TEST_P(NearestNeighborsEverywhere, OfEquallyNearTargetsTheLowestIndexWins) {
   // Integer coordinates: distances are exact, nearly all of them tied, and every point occurs about
   // ten times.

@@ -13,17 +13,20 @@
 namespace vggtcd {
 namespace {
 
-constexpr double kMinWeight = 1e-12;
-constexpr double kVarianceOffset = 1e-12;
+constexpr double kMinWeight = 1e-12;       // of the largest
+constexpr double kVarianceOffset = 1e-12;  // the reference's; unit squared, so:
+constexpr double kMaxOffsetShare = 1e-9;   // of the variance: no unit is so small that it counts
 
 std::vector<double> normalized_weights(std::span<const double> weights, size_t count) {
   std::vector<double> normalized(count, 1.0);
+  double largest = 0;
+  for (const double weight : weights) {
+    check(weight >= 0 && std::isfinite(weight), "umeyama: finite weights >= 0");
+    largest = std::max(largest, weight);
+  }
   double sum = 0;
   for (size_t i = 0; i < count; ++i) {
-    if (!weights.empty()) {
-      check(weights[i] >= 0 && std::isfinite(weights[i]), "umeyama: finite weights >= 0");
-      normalized[i] = std::max(weights[i], kMinWeight);
-    }
+    if (largest > 0) normalized[i] = std::max(weights[i], kMinWeight * largest);
     sum += normalized[i];
   }
   for (double& weight : normalized) weight /= sum;
@@ -118,7 +121,8 @@ UmeyamaResult umeyama(std::span<const Eigen::Vector3d> x, std::span<const Eigen:
   const Eigen::Vector3d sign(1, 1, result.reflected ? -1 : 1);
   Sim3& sim3 = result.y_from_x;
   sim3.rotation = svd.matrixU() * sign.asDiagonal() * svd.matrixV().transpose();
-  sim3.scale = options.with_scale ? d.dot(sign) / (spread_x.variance + kVarianceOffset) : 1.0;
+  const double offset = std::min(kVarianceOffset, kMaxOffsetShare * spread_x.variance);
+  sim3.scale = options.with_scale ? d.dot(sign) / (spread_x.variance + offset) : 1.0;
   sim3.translation = mean_y - sim3.scale * (sim3.rotation * mean_x);
   double sum = 0;
   for (size_t i = 0; i < x.size(); ++i) sum += w[i] * (y[i] - sim3 * x[i]).squaredNorm();

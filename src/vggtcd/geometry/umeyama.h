@@ -2,7 +2,7 @@
 // Umeyama: the similarity that maps one set of points onto another in the least-squares sense, in
 // closed form. S. Umeyama, "Least-squares estimation of transformation parameters between two point
 // patterns", IEEE PAMI 13(4), 1991. Weights and the two small constants follow the reference Python
-// code.
+// code, but for units of another size than its own.
 #pragma once
 
 #include <Eigen/Core>
@@ -49,9 +49,11 @@ struct UmeyamaResult {
 
 // Minimises sum_i w_i |y_i - (s R x_i + t)|^2 over s, R (a proper rotation) and t:
 //   mu = sum w x, S = sum w (y - mu_y)(x - mu_x)^T = U D V^T, R = U diag(1, 1, det(U) det(V)) V^T,
-//   s = tr(D diag(1, 1, det(U) det(V))) / (sum w |x - mu_x|^2 + 1e-12), t = mu_y - s R mu_x.
-// Weights are raised to at least 1e-12, then normalised to sum 1; empty: all equal. x, y and
-// weights have one length and are finite, weights are not negative; Error{kInternal} otherwise.
+//   s = tr(D diag(1, 1, det(U) det(V))) / (sum w |x - mu_x|^2 + e), t = mu_y - s R mu_x,
+// e = 1e-12, but at most 1e-9 of what it is added to: the unit of x does not matter. Weights are
+// raised to at least 1e-12 of the largest, then normalised to sum 1; empty, or all zero: all equal.
+// x, y and weights have one length and are finite, weights are not negative; Error{kInternal}
+// otherwise.
 UmeyamaResult umeyama(std::span<const Eigen::Vector3d> x, std::span<const Eigen::Vector3d> y,
                       std::span<const double> weights = {}, const UmeyamaOptions& options = {});
 

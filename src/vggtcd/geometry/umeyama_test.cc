@@ -84,6 +84,31 @@ TEST(Umeyama, RecoversASimilarityFarFromTheOrigin) {
   EXPECT_LT(result.rms, 1e-10);
 }
 
+TEST(Umeyama, TheUnitOfThePointsDoesNotMatter) {
+  Points x = random_points(50, 21);
+  Points y = map(x, kTruth);
+  const Points noise = random_points(50, 22);
+  std::vector<double> weights(50);
+  for (size_t i = 0; i < y.size(); ++i) {
+    y[i] += 0.1 * noise[i];
+    weights[i] = 0.1 + std::abs(noise[i].x());
+  }
+  const Sim3 expected = umeyama(x, y, weights).y_from_x;
+  for (const double unit : {1e-12, 1e-6, 1e9}) {
+    Points scaled_x = x, scaled_y = y;
+    for (auto* points : {&scaled_x, &scaled_y}) {
+      for (auto& p : *points) p *= unit;
+    }
+    std::vector<double> by_depth = weights;  // as 1 / depth^2
+    for (double& weight : by_depth) weight /= unit * unit;
+    const UmeyamaResult found = umeyama(scaled_x, scaled_y, by_depth);
+    ASSERT_TRUE(found.determined()) << unit;
+    EXPECT_NEAR(found.y_from_x.scale / expected.scale, 1, 2e-9) << unit;
+    EXPECT_LT((found.y_from_x.rotation - expected.rotation).norm(), 1e-12) << unit;
+    EXPECT_LT((found.y_from_x.translation / unit - expected.translation).norm(), 1e-8) << unit;
+  }
+}
+
 TEST(Umeyama, NoNearbySimilarityFitsNoisyPointsBetter) {
   const Points x = random_points(40, 2), noise = random_points(40, 3);
   Points y = map(x, kTruth);

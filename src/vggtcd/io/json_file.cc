@@ -60,6 +60,9 @@ Json read_json_file(const std::filesystem::path& path) try {
   } catch (const Json::parse_error& error) {
     throw_error(ErrorCode::kInput, "{}: expected JSON, found something else at byte {}",
                 path.string(), error.byte);
+  } catch (const Json::out_of_range&) {
+    throw_error(ErrorCode::kInput, "{}: expected JSON, found a number that no double can hold",
+                path.string());
   }
 } catch (...) {
   rethrow_naming(path);

@@ -2,9 +2,7 @@
 // Files as bytes: open, fstat, then read or mmap; and what happens when a mapped file is cut off.
 #include "vggtcd/io/mapped_file.h"
 
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>

@@ -25,9 +25,11 @@ namespace vggtcd {
 // scalar per vertex, "quality": a copy of the first field. Throws Error{kOutput}.
 class PlyWriter {
  public:
-  // Field names are letters, digits and underscores; comments are single lines of the header.
+  // Field names are letters, digits and underscores; comments are single lines of the header. With
+  // an origin other than zero positions are relative to it: the file has the sums, as doubles.
   PlyWriter(std::filesystem::path path, size_t num_points, std::vector<std::string> fields,
-            std::span<const std::string> comments = {});
+            std::span<const std::string> comments = {},
+            const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
   // rgb: three bytes; values: one per field.
   void add(const Eigen::Vector3f& position, const uint8_t* rgb, std::span<const float> values);
   // Expects that num_points were added.
@@ -37,6 +39,7 @@ class PlyWriter {
   void flush();
 
   OutputFile file_;
+  Eigen::Vector3d origin_;
   size_t num_points_;
   size_t num_fields_;
   size_t added_ = 0;
@@ -68,10 +71,12 @@ class PlyReader {
   size_t size() const;                             // points
   const std::vector<std::string>& fields() const;  // of PlyCloud
 
-  // The points in file order, in blocks that are as good as none in memory: positions, colours if
-  // the file has them, and the fields of these names, which must be there.
+  // The points in file order, in blocks that are as good as none in memory: positions (less the
+  // origin, before they are rounded to floats), colours if the file has them, and the fields of
+  // these names, which must be there.
   void read(std::span<const std::string> fields,
-            const std::function<void(const PlyCloud& block)>& sink) const;
+            const std::function<void(const PlyCloud& block)>& sink,
+            const Eigen::Vector3d& origin = Eigen::Vector3d::Zero()) const;
 
  private:
   struct Layout;

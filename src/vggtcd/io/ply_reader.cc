@@ -10,6 +10,7 @@
 #include "vggtcd/io/failure.h"
 #include "vggtcd/io/input_file.h"
 #include "vggtcd/io/ply.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd {
 namespace {
@@ -71,21 +72,23 @@ Header read_header(std::istream& file, const std::string& what) {
     std::string keyword, type, name;
     words >> keyword >> type >> name;
     if (keyword == "end_header") break;
-    if (keyword == "format" && type != "binary_little_endian") throw_not_ply(what, type + " data");
+    if (keyword == "format" && type != "binary_little_endian")
+      throw_not_ply(what, quote(type) + " data");
     if (keyword == "element") {
       after = after || vertices;
       vertices = type == "vertex";
-      if (!vertices && !after) throw_not_ply(what, "an element " + type + " before the vertices");
+      if (!vertices && !after)
+        throw_not_ply(what, "an element " + quote(type) + " before the vertices");
       const auto count = number_in<int64_t>(name);
       if (vertices && (after || !count)) {
-        throw_not_ply(what, "a broken header line: " + line.substr(0, 80));
+        throw_not_ply(what, "a broken header line: " + quote(line));
       }
       if (vertices) header.num_points = *count;
     }
     if (keyword == "property" && vertices) {
       Property property{name};
       if (!set_type(property, type) || header.find(name) != nullptr) {
-        throw_not_ply(what, "an unusable property: " + line.substr(0, 80));
+        throw_not_ply(what, "an unusable property: " + quote(line));
       }
       property.offset = header.record_bytes;
       header.record_bytes += property.size;
@@ -109,19 +112,19 @@ T load(const char* from) {
   return value;
 }
 
-float read_value(const Property& property, const char* record) {
+double read_value(const Property& property, const char* record) {
   const char* from = record + property.offset;
   switch (property.kind) {
     case 'u':
       if (property.size == 1) return load<uint8_t>(from);
       if (property.size == 2) return load<uint16_t>(from);
-      return static_cast<float>(load<uint32_t>(from));
+      return load<uint32_t>(from);
     case 'i':
       if (property.size == 1) return load<int8_t>(from);
       if (property.size == 2) return load<int16_t>(from);
-      return static_cast<float>(load<int32_t>(from));
+      return load<int32_t>(from);
     default:
-      return property.size == 4 ? load<float>(from) : static_cast<float>(load<double>(from));
+      return property.size == 4 ? static_cast<double>(load<float>(from)) : load<double>(from);
   }
 }
 
@@ -183,7 +186,8 @@ size_t PlyReader::size() const { return static_cast<size_t>(layout_->header.num_
 const std::vector<std::string>& PlyReader::fields() const { return layout_->fields; }
 
 void PlyReader::read(std::span<const std::string> fields,
-                     const std::function<void(const PlyCloud& block)>& sink) const try {
+                     const std::function<void(const PlyCloud& block)>& sink,
+                     const Eigen::Vector3d& origin) const try {
   const Layout& layout = *layout_;
   const size_t record_bytes = layout.header.record_bytes;
   const bool has_color = layout.color[0] != nullptr;
@@ -209,11 +213,13 @@ void PlyReader::read(std::span<const std::string> fields,
     for (size_t i = 0; i < points; ++i) {
       const char* record = &records[i * record_bytes];
       for (size_t k = 0; k < 3; ++k) {
-        block.positions[i][static_cast<Eigen::Index>(k)] = read_value(*layout.position[k], record);
+        const auto axis = static_cast<Eigen::Index>(k);
+        block.positions[i][axis] =
+            static_cast<float>(read_value(*layout.position[k], record) - origin[axis]);
         if (has_color) block.rgb[3 * i + k] = static_cast<uint8_t>(record[layout.color[k]->offset]);
       }
       for (size_t k = 0; k < wanted.size(); ++k) {
-        block.fields[k].values[i] = read_value(*wanted[k], record);
+        block.fields[k].values[i] = static_cast<float>(read_value(*wanted[k], record));
       }
     }
     sink(block);

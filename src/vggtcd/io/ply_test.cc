@@ -54,6 +54,35 @@ TEST(PlyWriter, WritesTheHeaderAndRecordsThatViewersExpect) {
   EXPECT_EQ(number(23), 0.5f);
 }
 
+TEST(PlyWriter, FarFromTheOriginPositionsAreDoubles) {
+  const TemporaryDirectory directory;
+  const Eigen::Vector3d origin(691234, 5334321, 512.5);
+  const Eigen::Vector3f position(0.001f, -1.25f, 3.5f);
+  {
+    PlyWriter ply(directory / "a.ply", 1, {"changed"}, {}, origin);
+    const uint8_t rgb[] = {1, 2, 3};
+    const float values[] = {1.0f};
+    ply.add(position, rgb, values);
+    ply.commit();
+  }
+  const std::string bytes = file_bytes(directory / "a.ply");
+  EXPECT_THAT(bytes, HasSubstr("property double x\nproperty double y\nproperty double z\n"));
+  double y = 0;
+  std::memcpy(&y, bytes.data() + bytes.find("end_header\n") + 11 + 8, sizeof(y));
+  EXPECT_EQ(y, 5334319.75);
+  const PlyReader reader(directory / "a.ply");
+  int blocks = 0;
+  reader.read(
+      {},
+      [&](const PlyCloud& block) {
+        ++blocks;
+        EXPECT_LT((block.positions[0] - position).norm(), 1e-8f);
+        EXPECT_THAT(block.rgb, ElementsAre(1, 2, 3));
+      },
+      origin);
+  EXPECT_EQ(blocks, 1);
+}
+
 TEST(ReadPly, ReadsBackWhatWasWritten) {
   const TemporaryDirectory directory;
   write_three_points(directory / "a.ply");
@@ -125,15 +154,18 @@ TEST(ReadPly, RefusesOtherAndDamagedFiles) {
   const std::string xyz = "property float x\nproperty float y\nproperty float z\nend_header\n";
   expect("", "found a truncated header");
   expect("obj\n", "found another file");
-  expect("ply\nformat ascii 1.0\nend_header\n", "found ascii data");
+  expect("ply\nformat " + std::string(5000, '\x1b') + " 1.0\nend_header\n", "found \"\\x1b\\x1b");
+  expect("ply\nformat ascii 1.0\nend_header\n", R"(found "ascii" data)");
   expect(start + "element vertex 2\n", "found a truncated header");
   expect(start + "end_header\n", "found no vertices with x, y and z");
   expect(start + "element vertex 2\nproperty float x\nend_header\n", "found no vertices");
-  expect(start + "element vertex 2x\n" + xyz, "found a broken header line: element vertex 2x");
-  expect(start + "element vertex two\n" + xyz, "found a broken header line: element vertex two");
+  expect(start + "element vertex 2x\n" + xyz, "found a broken header line: \"element vertex 2x\"");
+  expect(start + "element vertex two\n" + xyz,
+         "found a broken header line: \"element vertex two\"");
   expect(start + "element vertex 2\nproperty float x\n" + xyz, "found an unusable property");
   expect(start + "element vertex 2\nproperty list uchar int x\n" + xyz, "an unusable property");
-  expect(start + "element face 2\nelement vertex 2\n" + xyz, "an element face before the vertices");
+  expect(start + "element face 2\nelement vertex 2\n" + xyz,
+         "an element \"face\" before the vertices");
   expect(start + "element vertex 2\n" + xyz + std::string(23, 'a'),
          "expected 2 points of 12 bytes, found 23 bytes; truncated");
   expect(start + "element vertex 9000000000000000000\n" + xyz, "truncated");

@@ -28,15 +28,18 @@ bool is_word(const std::string& name) {
 }  // namespace
 
 PlyWriter::PlyWriter(std::filesystem::path path, size_t num_points, std::vector<std::string> fields,
-                     std::span<const std::string> comments)
-    : file_(std::move(path)), num_points_(num_points), num_fields_(fields.size()) {
+                     std::span<const std::string> comments, const Eigen::Vector3d& origin)
+    : file_(std::move(path)), origin_(origin), num_points_(num_points), num_fields_(fields.size()) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
   for (const std::string& comment : comments) {
     check(comment.find_first_of("\r\n") == std::string::npos, "PlyWriter: comment of one line");
     header += "comment " + comment + "\n";
   }
   header += fmt::format("element vertex {}\n", num_points);
-  for (const char* axis : {"x", "y", "z"}) header += fmt::format("property float {}\n", axis);
+  const char* position_type = origin.isZero(0) ? "float" : "double";
+  for (const char* axis : {"x", "y", "z"}) {
+    header += fmt::format("property {} {}\n", position_type, axis);
+  }
   for (const char* channel : {"red", "green", "blue"}) {
     header += fmt::format("property uchar {}\n", channel);
   }
@@ -52,7 +55,12 @@ PlyWriter::PlyWriter(std::filesystem::path path, size_t num_points, std::vector<
 void PlyWriter::add(const Eigen::Vector3f& position, const uint8_t* rgb,
                     std::span<const float> values) {
   check(values.size() == num_fields_, "PlyWriter: one value per field");
-  append(buffer_, position.data(), 3);
+  if (origin_.isZero(0)) {
+    append(buffer_, position.data(), 3);
+  } else {
+    const Eigen::Vector3d in_file = origin_ + position.cast<double>();
+    append(buffer_, in_file.data(), 3);
+  }
   append(buffer_, rgb, 3);
   append(buffer_, values.data(), values.size());
   if (!values.empty()) append(buffer_, values.data(), 1);

@@ -26,4 +26,13 @@ struct PredictionLayout {
 void verify_poses(const NpzReader& npz, const PredictionLayout& layout,
                   const Reconstruction& reconstruction, ProgressSink& progress);
 
+// Depths that are no part of the scene become 0, with one notice (scene/stray_depths.h): one pixel
+// must not decide where the scene ends.
+void drop_strays(const std::string& name, Reconstruction& reconstruction, ProgressSink& progress);
+
+// Into a local frame, where the file's origin is far away (scene/local_frame.h). A notice says
+// when the file's poses have too few digits for that.
+void move_near(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& reconstruction,
+               ProgressSink& progress);
+
 }  // namespace vggtcd::internal

@@ -2,6 +2,7 @@
 // Reconstruction -> a prediction file with VGGT's keys.
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/predictions.h"
+#include "vggtcd/scene/local_frame.h"
 
 namespace vggtcd {
 namespace {
@@ -18,8 +19,10 @@ void write(const std::filesystem::path& path, const Reconstruction& reconstructi
   for (size_t i = 0; i < reconstruction.views.size(); ++i) {
     const View& view = reconstruction.views[i];
     Eigen::Map<RowMajor34> pose(poses.data() + i * 12);
-    pose.leftCols<3>() = view.camera_from_world.rotation;
-    pose.col(3) = view.camera_from_world.translation;
+    const Rigid3 in_world =
+        camera_from_world(view.camera_from_world, reconstruction.origin_in_world);
+    pose.leftCols<3>() = in_world.rotation;
+    pose.col(3) = in_world.translation;
     Eigen::Map<RowMajor33>(intrinsics.data() + i * 9) = view.pinhole.matrix();
     names.push_back(view.name);
   }

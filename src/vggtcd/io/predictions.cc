@@ -327,8 +327,10 @@ Reconstruction read_arrays(const NpzReader& npz, ProgressSink& progress, int min
   read_confidence(npz, layout, result, progress);
   apply_mask(npz, layout, result);
   drop_invalid_pixels(npz.name(), result, progress);
+  internal::drop_strays(npz.name(), result, progress);
   internal::verify_poses(npz, layout, result, progress);
   read_colors(npz, layout, result, progress);
+  internal::move_near(npz, layout, result, progress);
   check_consistent(result);
   return result;
 }

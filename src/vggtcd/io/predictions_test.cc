@@ -132,6 +132,76 @@ TEST(ReadReconstruction, ReadsBackWhatWasWritten) {
   expect_truth(back, 1e-5);
 }
 
+// A file of the golden scene with its origin moved, poses and points as doubles or floats.
+void write_moved(const std::filesystem::path& path, const Eigen::Vector3d& by, bool doubles) {
+  RecordingProgress progress;
+  const NpzReader npz(source_file("tests/golden/npz/vggt.npz"));
+  std::vector<double> poses = npz.read<double>("extrinsic");
+  for (size_t i = 0; i < kFrames; ++i) {
+    Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> pose(poses.data() + 12 * i);
+    pose.col(3) -= pose.leftCols<3>() * by;
+  }
+  std::vector<double> points = npz.read<double>("world_points_from_depth");
+  for (size_t i = 0; i < points.size(); ++i) points[i] += by[static_cast<Eigen::Index>(i % 3)];
+  const std::vector<float> depth = npz.read<float>("depth"),
+                           intrinsics = npz.read<float>("intrinsic"),
+                           poses_f32(poses.begin(), poses.end()),
+                           points_f32(points.begin(), points.end());
+  NpzWriter moved(path);
+  const std::vector<int64_t> pose_shape = npz.header("extrinsic").shape,
+                             point_shape = npz.header("world_points_from_depth").shape;
+  if (doubles) {
+    moved.add<double>("extrinsic", pose_shape, poses);
+    moved.add<double>("world_points_from_depth", point_shape, points);
+  } else {
+    moved.add<float>("extrinsic", pose_shape, poses_f32);
+    moved.add<float>("world_points_from_depth", point_shape, points_f32);
+  }
+  moved.add<float>("intrinsic", npz.header("intrinsic").shape, intrinsics);
+  moved.add<float>("depth", npz.header("depth").shape, depth);
+  moved.finish();
+}
+
+TEST(ReadReconstruction, AnOriginFarAwayLosesNothing) {
+  Fixture f;
+  const Reconstruction near =
+      read_reconstruction(source_file("tests/golden/npz/vggt.npz"), f.progress);
+  const Eigen::Vector3d far(691234.375, 5334321.75, 512.25);
+  write_moved(f.directory / "far.npz", far, true);
+  const Reconstruction r = read_reconstruction(f.directory / "far.npz", f.progress);
+  EXPECT_GT(r.origin_in_world.x(), 6.9e5);
+  for (const auto& notice : f.progress.notices) EXPECT_THAT(notice, Not(HasSubstr("bit numbers")));
+  for (uint32_t pixel = 0; pixel < kPixels; pixel += 7) {
+    const Eigen::Vector3d in_world = r.origin_in_world + unproject_pixel(r, pixel).cast<double>();
+    EXPECT_LT((in_world - far - unproject_pixel(near, pixel).cast<double>()).norm(), 1e-5) << pixel;
+  }
+  // What we write has the file's origin again.
+  write_reconstruction(f.directory / "back.npz", r);
+  const Reconstruction back = read_reconstruction(f.directory / "back.npz", f.progress);
+  EXPECT_EQ(back.origin_in_world, r.origin_in_world);
+  EXPECT_LT((back.views[1].camera_from_world.translation - r.views[1].camera_from_world.translation)
+                .norm(),
+            1e-8);
+}
+
+TEST(ReadReconstruction, SaysWhenTheDigitsOfPosesEndTooEarly) {
+  Fixture f;
+  write_moved(f.directory / "far.npz", {691234.375, 5334321.75, 512.25}, false);
+  read_reconstruction(f.directory / "far.npz", f.progress);
+  EXPECT_THAT(f.progress.notices, testing::Contains(HasSubstr("extrinsic: 32-bit numbers")));
+}
+
+TEST(ReadReconstruction, OneDepthFarFromAllOthersIsDroppedWithANotice) {
+  Fixture f;
+  Arrays arrays = Arrays::vggt();
+  arrays["depth"][7] = 1e30f;
+  const Reconstruction r = f.read(arrays);
+  EXPECT_EQ(r.depth[7], 0);
+  EXPECT_EQ(without_depth(r), 1u);
+  EXPECT_THAT(f.progress.notices,
+              ElementsAre(HasSubstr("t1.npz: 1 of 192 pixels are ignored: their depth is far")));
+}
+
 // The inverse of each pose, kept as [S, 3, 4].
 void invert_poses(Arrays& arrays) {
   std::vector<float>& poses = arrays["extrinsic"];

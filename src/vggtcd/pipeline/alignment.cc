@@ -2,6 +2,8 @@
 // Alignment of two epochs: which stages ran, what each one found, and what was chosen.
 #include "vggtcd/pipeline/alignment.h"
 
+#include "vggtcd/scene/local_frame.h"
+
 namespace vggtcd {
 
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod) {
@@ -96,6 +98,29 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
     log.progress().notice(plausibility.explanation);
   }
   return result;
+}
+
+Alignment in_worlds(Alignment alignment, const FrameOrigins& origins) {
+  const auto express = [&](Sim3& t2_from_t1) {
+    t2_from_t1 = between_worlds(t2_from_t1, origins.t1, origins.t2);
+  };
+  express(alignment.t2_from_t1);
+  express(alignment.initial_t2_from_t1);
+  if (alignment.coarse) {
+    express(alignment.coarse->t2_from_t1);
+    for (const auto& [epoch, origin] : {std::pair(&alignment.coarse->t1, origins.t1),
+                                        std::pair(&alignment.coarse->t2, origins.t2)}) {
+      epoch->joint_from_epoch = between_worlds(epoch->joint_from_epoch, origin, origins.joint);
+    }
+  }
+  if (alignment.fine) express(alignment.fine->t2_from_t1);
+  if (alignment.robust) {
+    express(alignment.robust->t2_from_t1);
+    alignment.robust->pivot_in_t2 += origins.t2;
+  }
+  for (AlignmentCandidate& candidate : alignment.candidates) express(candidate.t2_from_t1);
+  if (alignment.uncertainty) alignment.uncertainty->pivot += origins.t2;
+  return alignment;
 }
 
 }  // namespace vggtcd

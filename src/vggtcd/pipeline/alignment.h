@@ -91,10 +91,19 @@ struct Alignment {
   PlausibilityResult plausibility;
 };
 
-// Runs the stages that the method asks for. Reconstructions are as read; with shared_intrinsics the
-// caller has applied share_intrinsics to all of them. Throws Error{kImplausible} for an alignment
+// Runs the stages that the method asks for. Reconstructions are as read, and similarities are
+// between their local frames; with shared_intrinsics the caller has applied share_intrinsics to all
+// of them. Throws Error{kImplausible} for an alignment
 // that nobody would want the changes of, unless options.accept_alignment.
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log);
+
+// Where the local frames that were computed in have their origins (scene/local_frame.h).
+struct FrameOrigins {
+  Eigen::Vector3d t1 = Eigen::Vector3d::Zero(), t2 = t1, joint = t1;
+};
+
+// The same alignment between the worlds of the files, as results state it.
+Alignment in_worlds(Alignment alignment, const FrameOrigins& origins);
 
 }  // namespace vggtcd

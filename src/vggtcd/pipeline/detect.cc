@@ -13,6 +13,7 @@
 #include "vggtcd/pipeline/results.h"
 #include "vggtcd/registration/shared_intrinsics.h"
 #include "vggtcd/report/read_results.h"
+#include "vggtcd/scene/local_frame.h"
 
 namespace vggtcd {
 namespace {
@@ -22,6 +23,12 @@ struct Epochs {
   std::optional<JointReconstruction> joint;
   InitialAlignment initial;
 };
+
+FrameOrigins origins_of(const Epochs& epochs) {
+  const auto nowhere = Eigen::Vector3d(Eigen::Vector3d::Zero());
+  return {epochs.before.origin_in_world, epochs.after.origin_in_world,
+          epochs.joint ? epochs.joint->reconstruction.origin_in_world : nowhere};
+}
 
 // 1. Read.
 Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, StageLog& log) {
@@ -61,6 +68,9 @@ Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, S
                       "--aligned expects two reconstructions in one frame and one scale; otherwise "
                       "give --joint or --initial-sim3"};
   }
+  // What was given is between the files' worlds.
+  epochs.initial.t2_from_t1 = between_local_frames(
+      epochs.initial.t2_from_t1, epochs.before.origin_in_world, epochs.after.origin_in_world);
   return epochs;
 }
 
@@ -138,6 +148,18 @@ PointVariance registration_variance(const Alignment& alignment) {
   return {alignment.uncertainty->covariance, alignment.uncertainty->pivot};
 }
 
+// A verdict over nothing is none.
+void expect_evidence(const ChangeSet& changes) {
+  for (const auto& [name, points] :
+       {std::pair("before", changes.t1.points), std::pair("after", changes.t2.points)}) {
+    if (points > 0) continue;
+    throw_error(ErrorCode::kDegenerate,
+                "{} epoch: expected pixels that can be judged, found none; are its depths and "
+                "confidences right?",
+                name);
+  }
+}
+
 }  // namespace
 
 std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
@@ -181,8 +203,10 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   const std::optional<MetricProblem> metres = metric_problem_of(inputs, epochs, progress);
 
   // 2. Align: coarse, fine.
-  outcome.alignment = align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
-  const Sim3& t2_from_t1 = outcome.alignment.t2_from_t1;
+  const Alignment alignment =
+      align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
+  const Sim3& t2_from_t1 = alignment.t2_from_t1;
+  outcome.alignment = in_worlds(alignment, origins_of(epochs));
   epochs.joint.reset();
 
   // 3. Compare.
@@ -198,12 +222,13 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
       FractionsOf fractions(stage);
       FreeSpaceChange votes =
           free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
-                             registration_variance(outcome.alignment), fractions,
+                             registration_variance(alignment), fractions,
                              question ? &*question : nullptr, answers->sink());
       outcome.explanation = std::move(votes.explanation);
       decide_by_labels(std::move(votes), changes);
     });
   }
+  expect_evidence(changes);
   ChangeInstances instances;
   log.run("changed things", [&](ProgressStage&) {
     instances = find_instances(epochs.before, epochs.after, t2_from_t1, changes, options.instances);
@@ -221,11 +246,12 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   outcome.unobserved_t2 = changes.t2.unobserved;
 
   // 4. From here on everything is in the frame and the unit of the results.
-  ResultFrame frame;
+  ResultFrame frame(epochs.after);
   if (metres) {
-    outcome.metric =
+    const Metric metric =
         metres->solve(epochs.before, epochs.after, t2_from_t1, changes.surface_sigma_u);
-    frame = ResultFrame(*outcome.metric);
+    frame = ResultFrame(metric, epochs.after);
+    outcome.metric = in_worlds(metric, epochs.after.origin_in_world);
   }
   express(frame, changes, answers ? &*answers : nullptr, instances, outcome.explanation);
   const Sim3 result_from_t1 = frame.from_t2 * t2_from_t1;
@@ -286,10 +312,12 @@ RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOption
   Epochs epochs = read_epochs(inputs, options, log);
   Json summary = summary_head("register", inputs, epochs);
   const std::optional<MetricProblem> metres = metric_problem_of(inputs, epochs, progress);
-  RegisterOutcome outcome{align(epochs.before, epochs.after, epochs.initial, options, log), {}};
+  const Alignment local = align(epochs.before, epochs.after, epochs.initial, options, log);
+  RegisterOutcome outcome{in_worlds(local, origins_of(epochs)), {}};
   const Alignment& alignment = outcome.alignment;
   if (metres) {
-    outcome.metric = metres->solve(epochs.before, epochs.after, alignment.t2_from_t1, 0);
+    outcome.metric = in_worlds(metres->solve(epochs.before, epochs.after, local.t2_from_t1, 0),
+                               epochs.after.origin_in_world);
     summary["metric"] = metric_json(*outcome.metric);
   }
   log.run("write results", [&](ProgressStage&) {

@@ -7,6 +7,7 @@
 
 #include "vggtcd/core/number_text.h"
 #include "vggtcd/io/quote.h"
+#include "vggtcd/scene/local_frame.h"
 #include "vggtcd/scene/point_cloud.h"
 
 namespace vggtcd {
@@ -171,6 +172,18 @@ Metric MetricProblem::solve(const Reconstruction& before, const Reconstruction& 
   for (const KnownLength& length : lengths) {
     metric.measured_m.push_back(metric.frame.metres_from_t2.scale * length.length_u);
   }
+  return metric;
+}
+
+std::string frame_name(const Metric& metric) { return metric.cameras.empty() ? "T2" : "reference"; }
+
+Metric in_worlds(Metric metric, const Eigen::Vector3d& origin_t2) {
+  Sim3& metres_from_t2 = metric.frame.metres_from_t2;
+  // A length alone scales T2 about its world's origin.
+  const Eigen::Vector3d origin_m = metric.cameras.empty()
+                                       ? Eigen::Vector3d(metres_from_t2.scale * origin_t2)
+                                       : Eigen::Vector3d(Eigen::Vector3d::Zero());
+  metres_from_t2 = between_worlds(metres_from_t2, origin_t2, origin_m);
   return metric;
 }
 

@@ -70,6 +70,13 @@ class MetricProblem {
   std::vector<Camera> cameras_;
 };
 
+// "T2", scaled to metres, or "reference".
+std::string frame_name(const Metric& metric);
+
+// The same with metres_from_t2 between the worlds of the files, as results state it: it is found in
+// T2's local frame, whose origin lies at origin_t2 (scene/local_frame.h).
+Metric in_worlds(Metric metric, const Eigen::Vector3d& origin_t2);
+
 // "1 scene unit is 0.742 m (standard error 0.4 %), from ..."
 std::string metric_sentence(const Metric& metric);
 

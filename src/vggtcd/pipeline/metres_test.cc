@@ -143,7 +143,7 @@ TEST(ResultFrame, MetresAreInNamesAndNumbers) {
   metric.frame.metres_from_t2 = {2.0, Eigen::Matrix3d::Identity(), {1, 0, 0}};
   metric.frame.scale_sigma = 0.01;
   metric.cameras = {"after/a.jpg"};
-  const ResultFrame frame(metric);
+  const ResultFrame frame(metric, Scene().after);
   EXPECT_EQ(frame.name, "reference");
   EXPECT_EQ(frame.key("volume_sigma_u3"), "volume_sigma_m3");
   EXPECT_EQ(frame.key("surface_u2"), "surface_m2");
@@ -187,6 +187,38 @@ TEST(ResultFrame, MetresAreInNamesAndNumbers) {
   EXPECT_EQ(part.surface_u2, 24);
   EXPECT_DOUBLE_EQ(part.volume_u3, 8);
   EXPECT_DOUBLE_EQ(part.volume_sigma_u3, std::hypot(0.8, 3 * 0.01 * 8));
+}
+
+TEST(ResultFrame, AReferenceFarAwayIsWrittenAboutAnOriginNearby) {
+  Metric metric;
+  metric.frame.metres_from_t2 = {2.0, Eigen::Matrix3d::Identity(), {691234.4, 5334321.3, 100}};
+  metric.cameras = {"after/a.jpg"};
+  const Scene scene;
+  const ResultFrame frame(metric, scene.after);
+  ASSERT_TRUE(frame.is_far());
+  const Eigen::Vector3d x(0.1, 0.2, 0.3);
+  EXPECT_LT((frame.origin + frame.from_t2 * x - metric.frame.metres_from_t2 * x).norm(), 1e-8);
+  EXPECT_LT((frame.from_t2 * x).norm(), 100);
+  ChangeSet changes;
+  ChangeInstances instances;
+  instances.instances.resize(1);
+  instances.instances[0].after.emplace().box.center = x;
+  std::optional<PixelExplanation> none;
+  express(frame, changes, nullptr, instances, none);
+  EXPECT_LT((instances.instances[0].after->box.center - metric.frame.metres_from_t2 * x).norm(),
+            1e-8);
+}
+
+TEST(ResultFrame, ALengthScalesAFarFrameAboutItsWorldsOrigin) {
+  Metric metric;
+  metric.frame.metres_from_t2.scale = 2;
+  Scene scene;
+  scene.after.origin_in_world = {500000, 4000000, 0};
+  const ResultFrame frame(metric, scene.after);
+  EXPECT_EQ(frame.origin, Eigen::Vector3d(1000000, 8000000, 0));
+  const Sim3 in_files = in_worlds(metric, scene.after.origin_in_world).frame.metres_from_t2;
+  EXPECT_LT(in_files.translation.norm(), 1e-9);
+  EXPECT_EQ(in_files.scale, 2);
 }
 
 TEST(ResultFrame, WithoutMetresNothingChanges) {

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include "vggtcd/scene/local_frame.h"
+
 namespace vggtcd {
 namespace {
 
@@ -27,7 +29,7 @@ void scale_all(ScratchArray<float>& values, size_t size, double scale) {
 
 void express(const ResultFrame& frame, InstancePart& part) {
   const double s = frame.from_t2.scale;
-  part.box.center = frame.from_t2 * part.box.center;
+  part.box.center = frame.from_t2 * part.box.center + frame.origin;
   part.box.rotation = frame.from_t2.rotation * part.box.rotation;
   part.box.size *= s;
   part.volume_u3 *= s * s * s;
@@ -52,11 +54,23 @@ void express(double scale, PixelExplanation& why) {
 
 }  // namespace
 
-ResultFrame::ResultFrame(const Metric& metric)
-    : name(metric.cameras.empty() ? "T2" : "reference"),
+ResultFrame::ResultFrame(const Reconstruction& after) : origin(after.origin_in_world) {}
+
+ResultFrame::ResultFrame(const Metric& metric, const Reconstruction& after)
+    : name(frame_name(metric)),
       unit("m"),
       from_t2(metric.frame.metres_from_t2),
-      scale_sigma(metric.frame.scale_sigma.value_or(0)) {}
+      scale_sigma(metric.frame.scale_sigma.value_or(0)) {
+  if (metric.cameras.empty()) {  // a length alone scales T2 about its world's origin
+    origin = from_t2.scale * after.origin_in_world;
+    return;
+  }
+  std::vector<Eigen::Vector3d> centers;
+  for (const View& view : after.views) centers.push_back(camera_center(view.camera_from_world));
+  const SceneSize scene = scene_size(after, centers);
+  origin = local_origin(from_t2 * scene.middle, from_t2.scale * scene.size);
+  from_t2.translation -= origin;
+}
 
 std::string ResultFrame::key(std::string_view name_in_u) const {
   std::string result(name_in_u);
@@ -81,6 +95,11 @@ Json ResultFrame::renamed(const Json& json) const {
 
 void express(const ResultFrame& frame, ChangeSet& changes, AnswerStore* answers,
              ChangeInstances& instances, std::optional<PixelExplanation>& explanation) {
+  if (!frame.is_metric() && !frame.is_far()) return;
+  for (ChangeInstance& instance : instances.instances) {
+    if (instance.before) express(frame, *instance.before);
+    if (instance.after) express(frame, *instance.after);
+  }
   if (!frame.is_metric()) return;
   const double s = frame.from_t2.scale;
   for (EpochChange* epoch : {&changes.t1, &changes.t2}) scale_all(epoch->score, s);
@@ -98,10 +117,6 @@ void express(const ResultFrame& frame, ChangeSet& changes, AnswerStore* answers,
   // Rounded as the scores are, so that the same pixels are beyond them.
   for (double* bound : {&changes.threshold_u, &changes.bound_u}) {
     *bound = static_cast<double>(static_cast<float>(*bound) * static_cast<float>(s));
-  }
-  for (ChangeInstance& instance : instances.instances) {
-    if (instance.before) express(frame, *instance.before);
-    if (instance.after) express(frame, *instance.after);
   }
   if (explanation) express(s, *explanation);
 }

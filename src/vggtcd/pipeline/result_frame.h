@@ -20,11 +20,18 @@ namespace vggtcd {
 struct ResultFrame {
   std::string name = "T2";  // or "reference"
   std::string unit = "u";   // scene units, or "m"
+  // From the local frame of T2 to that of the results, whose origin lies there in the coordinates
+  // that files have: points are floats in the former, doubles in files (scene/local_frame.h).
   Sim3 from_t2;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double scale_sigma = 0;  // relative; 0 also where it is not known
 
   ResultFrame() = default;
-  explicit ResultFrame(const Metric& metric);
+  // Without metres.
+  explicit ResultFrame(const Reconstruction& after);
+  ResultFrame(const Metric& metric, const Reconstruction& after);
+
+  bool is_far() const { return !origin.isZero(0); }
 
   bool is_metric() const { return unit == "m"; }
   // "scene_extent_u" -> "scene_extent_m", "volume_u3" -> "volume_m3" if the unit is "m".

@@ -17,6 +17,7 @@
 #include "vggtcd/io/tum.h"
 #include "vggtcd/report/heat_map.h"
 #include "vggtcd/report/overlay_names.h"
+#include "vggtcd/scene/local_frame.h"
 #include "vggtcd/scene/point_cloud.h"
 
 namespace vggtcd {
@@ -139,7 +140,7 @@ Json sim3_json(const Alignment& alignment, const std::optional<Metric>& metric) 
   if (metric) {
     const MetricFrame& frame = metric->frame;
     Json& into = json["metres_from_t2"] = sim3_to_json(frame.metres_from_t2);
-    into["frame"] = ResultFrame(*metric).name;
+    into["frame"] = frame_name(*metric);
     into["scale_sigma_relative"] = frame.scale_sigma ? Json(*frame.scale_sigma) : Json(nullptr);
     into["rotation_sigma_deg"] = frame.rotation_sigma_rad * 180 / M_PI;
     into["position_sigma_m"] = frame.position_sigma_m;
@@ -169,13 +170,15 @@ Json alignment_json(const Alignment& alignment) {
 }
 
 Json change_json(const ChangeSet& changes, const ResultFrame& frame) {
-  return frame.renamed({{"frame", frame.name},
-                        {"unit", frame.unit},
-                        {"scene_extent_u", changes.scene_extent_u},
-                        {"threshold_u", changes.threshold_u},
-                        {"bound_u", changes.bound_u},
-                        {"t1", epoch_change_json(changes.t1)},
-                        {"t2", epoch_change_json(changes.t2)}});
+  Json json = {{"frame", frame.name},
+               {"unit", frame.unit},
+               {"scene_extent_u", changes.scene_extent_u},
+               {"threshold_u", changes.threshold_u},
+               {"bound_u", changes.bound_u},
+               {"t1", epoch_change_json(changes.t1)},
+               {"t2", epoch_change_json(changes.t2)}};
+  if (frame.is_far()) json["origin_u"] = vector_json(frame.origin);
+  return frame.renamed(json);
 }
 
 Json explanation_json(const PixelExplanation& why, const ResultFrame& frame) {
@@ -232,7 +235,8 @@ void write_change_ply(const std::filesystem::path& path, const Reconstruction& e
   std::vector<std::string> fields = {"change_distance", "changed", "confidence"};
   if (answers) fields.insert(fields.end(), {"label", "label_confidence", "level_of_detection"});
   const size_t num_fields = fields.size(), per_frame = epoch.pixels_per_frame();
-  PlyWriter writer(path, static_cast<size_t>(change.points), std::move(fields), comments);
+  PlyWriter writer(path, static_cast<size_t>(change.points), std::move(fields), comments,
+                   in_frame.origin);
   std::vector<float> label_confidence(answers ? per_frame : 0);
   std::vector<float> level_of_detection(answers ? per_frame : 0);
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
@@ -338,10 +342,11 @@ void write_overlays(const std::filesystem::path& directory, const Reconstruction
 }
 
 std::vector<View> views_in(const Reconstruction& epoch, const Sim3& frame_from_epoch,
-                           const std::string& name_prefix) {
+                           const Eigen::Vector3d& origin, const std::string& name_prefix) {
   std::vector<View> views = epoch.views;
   for (View& view : views) {
-    view.camera_from_world = camera_from_new_world(view.camera_from_world, frame_from_epoch);
+    view.camera_from_world =
+        camera_from_world(camera_from_new_world(view.camera_from_world, frame_from_epoch), origin);
     view.name = name_prefix + view.name;
   }
   return views;
@@ -349,8 +354,8 @@ std::vector<View> views_in(const Reconstruction& epoch, const Sim3& frame_from_e
 
 void write_cameras(const std::filesystem::path& directory, const Reconstruction& before,
                    const Reconstruction& after, const Sim3& t2_from_t1, const ResultFrame& frame) {
-  std::vector<View> views = views_in(before, frame.from_t2 * t2_from_t1, "before/");
-  const std::vector<View> views_t2 = views_in(after, frame.from_t2, "after/");
+  std::vector<View> views = views_in(before, frame.from_t2 * t2_from_t1, frame.origin, "before/");
+  const std::vector<View> views_t2 = views_in(after, frame.from_t2, frame.origin, "after/");
   const std::string comment = fmt::format("frame: {}, unit: {}", frame.name, frame.unit_in_words());
   write_tum(directory / "cameras_before.tum", trajectory_of(views), comment);
   write_tum(directory / "cameras_after.tum", trajectory_of(views_t2), comment);
@@ -365,8 +370,11 @@ void write_authors_layout(const std::filesystem::path& directory, const Reconstr
   write_sim3_npz(directory / "coarse_sim3.npz", alignment.initial_t2_from_t1);
   write_sim3_npz(directory / "fine_sim3.npz", alignment.t2_from_t1);
   constexpr PoseConvention kTheirs = PoseConvention::kCameraFromWorld;
-  write_npy_poses(directory / "pred_poses_t1.npy", trajectory_of(before.views), kTheirs);
-  write_npy_poses(directory / "pred_poses_t2.npy", trajectory_of(after.views), kTheirs);
+  const auto as_in_file = [](const Reconstruction& epoch) {
+    return trajectory_of(views_in(epoch, {}, epoch.origin_in_world, ""));
+  };
+  write_npy_poses(directory / "pred_poses_t1.npy", as_in_file(before), kTheirs);
+  write_npy_poses(directory / "pred_poses_t2.npy", as_in_file(after), kTheirs);
   // Their keys; what is theirs alone (the network's own time) is not invented.
   Json timing = {{"coarse", 0.0}, {"fine", 0.0}, {"total", 0.0}};
   int64_t peak = 0;

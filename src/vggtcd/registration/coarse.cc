@@ -2,10 +2,12 @@
 // Coarse registration through the joint pass over keyframes (section 3.2 of the paper).
 #include "vggtcd/registration/coarse.h"
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
 #include "vggtcd/core/splitmix64.h"
+#include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/geometry/umeyama.h"
 #include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/point_cloud.h"
@@ -54,6 +56,30 @@ std::vector<PixelPair> confident_pairs(const Reconstruction& epoch, const Recons
   return pairs;
 }
 
+// Takes out pairs that show two surfaces: their depths in the two passes differ by more than a
+// factor of three from what the passes' scales make of them. A least-squares fit would follow a
+// single one of them wherever it lies. Where more than one in a hundred is like that, it is no
+// stray: the passes do not fit together, and the fit will show it.
+void drop_stray_pairs(const Reconstruction& epoch, const Reconstruction& joint,
+                      std::vector<PixelPair>& pairs) {
+  constexpr double kOtherSurface = 3;
+  constexpr size_t kOneIn = 100;
+  if (pairs.empty()) return;
+  const auto ratio = [&](const PixelPair& pair) {
+    return static_cast<double>(joint.depth[pair.in_joint]) /
+           static_cast<double>(epoch.depth[pair.in_epoch]);
+  };
+  std::vector<double> ratios;
+  for (const PixelPair& pair : pairs) ratios.push_back(ratio(pair));
+  const double common = middle_of(std::move(ratios));
+  const auto is_stray = [&](const PixelPair& pair) {
+    const double off = ratio(pair) / common;
+    return off > kOtherSurface || off < 1 / kOtherSurface;
+  };
+  const auto strays = static_cast<size_t>(std::ranges::count_if(pairs, is_stray));
+  if (strays * kOneIn <= pairs.size()) std::erase_if(pairs, is_stray);
+}
+
 // The mean squared distance from the mean.
 double variance(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -90,8 +116,9 @@ EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruct
 
   const std::vector<PixelPair> candidates =
       confident_pairs(epoch, joint, keyframes, first_joint_frame);
-  const std::vector<PixelPair> pairs =
+  std::vector<PixelPair> pairs =
       subsample(candidates, static_cast<size_t>(options.max_correspondences), options.seed);
+  drop_stray_pairs(epoch, joint, pairs);
   if (pairs.size() < 3) {
     throw_error(ErrorCode::kDegenerate,
                 "{} epoch: expected at least 3 confident pixels in its {} keyframes, found {}",

@@ -47,7 +47,8 @@ struct CoarseResult {
 // Umeyama's closed form over the pixels that keyframe i has in both reconstructions: pixel (u, v)
 // of frame keyframes[i] of the epoch and of frame first_joint_frame + i of the joint pass. Kept are
 // pixels with depth in both whose confidence in the epoch's own pass is above the median over the
-// whole epoch (scene/confidence.h). Throws Error{kDegenerate} naming `epoch_name` if fewer than 3
+// whole epoch (scene/confidence.h), but for up to one in a hundred whose depths differ so much that
+// they show two surfaces. Throws Error{kDegenerate} naming `epoch_name` if fewer than 3
 // pairs are left or they do not determine a similarity (a line, a point), Error{kInput} if the
 // frame sizes differ.
 EpochToJoint align_epoch_to_joint(const Reconstruction& epoch, const Reconstruction& joint,

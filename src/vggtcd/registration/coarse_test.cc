@@ -74,6 +74,46 @@ TEST(AlignCoarse, RecoversTheSimilarityOfExactReconstructions) {
   EXPECT_LT(result.t1.rms_residual_u, 1e-5);
 }
 
+// What one sure pixel of a keyframe makes of the alignment when its depth is multiplied.
+CoarseResult with_one_pixel(float factor) {
+  Epochs e;
+  const size_t sure = static_cast<size_t>(std::ranges::max_element(e.before.confidence) -
+                                          e.before.confidence.begin());
+  const size_t in_first_frame = sure % e.before.pixels_per_frame();
+  e.before.depth[in_first_frame] *= factor;
+  e.before.confidence[in_first_frame] *= 2;
+  return align_coarse(e.before, e.after, e.joint, {});
+}
+
+TEST(AlignCoarse, OnePixelFarAwayDecidesNothing) {
+  const int64_t all = with_one_pixel(1).t1.correspondences;
+  for (const float factor : {0.001f, 0.3f, 3.5f, 100.0f, 1e8f}) {
+    const CoarseResult result = with_one_pixel(factor);
+    EXPECT_EQ(result.t1.correspondences, all - 1) << factor;
+    expect_near(result.t2_from_t1, kT2FromScene * kT1FromScene.inverse(), 1e-5);
+    EXPECT_LT(result.t1.unexplained_share, 1e-8) << factor;
+  }
+}
+
+TEST(AlignCoarse, APassOfOtherDepthsStaysOneThatDoesNotFit) {
+  Epochs e;
+  for (size_t i = 0; i < e.before.depth.size(); i += 3) e.before.depth[i] *= 5;
+  EXPECT_GT(align_coarse(e.before, e.after, e.joint, {}).t1.unexplained_share, 0.1);
+}
+
+TEST(AlignCoarse, TheUnitsOfThePassesDoNotMatter) {
+  Epochs e;
+  const Sim3 expected = align_coarse(e.before, e.after, e.joint, {}).t2_from_t1;
+  for (Reconstruction* r : {&e.before, &e.after, &e.joint.reconstruction}) {
+    for (float& depth : r->depth) depth *= 1e-9f;
+    for (View& view : r->views) view.camera_from_world.translation *= 1e-9;
+  }
+  const CoarseResult found = align_coarse(e.before, e.after, e.joint, {});
+  EXPECT_NEAR(found.t2_from_t1.scale / expected.scale, 1, 1e-6);
+  EXPECT_LT((found.t2_from_t1.rotation - expected.rotation).norm(), 1e-6);
+  EXPECT_LT((found.t2_from_t1.translation * 1e9 - expected.translation).norm(), 1e-5);
+}
+
 TEST(AlignCoarse, IgnoresPixelsBelowTheMedianConfidence) {
   Epochs e;
   // Garbage depth at the low-confidence half of the keyframes' pixels.

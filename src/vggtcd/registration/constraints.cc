@@ -111,7 +111,8 @@ std::string mixture_in_words(const Vector7& motion) {
 }
 
 std::vector<std::string> describe(Motions motions, const Vector7& sigma,
-                                  const Eigen::Vector3d& pivot) {
+                                  const Eigen::Vector3d& pivot,
+                                  const Eigen::Vector3d& origin_in_world) {
   std::vector<std::string> texts;
   Eigen::Matrix3Xd slides = take_pure(motions, 3);
   for (Eigen::Index k = 0; k < slides.cols(); ++k) {
@@ -122,7 +123,9 @@ std::vector<std::string> describe(Motions motions, const Vector7& sigma,
   const Matrix7 to_center = sigma.cwiseInverse().asDiagonal() * pivot_change(center - pivot) *
                             Matrix7(sigma.asDiagonal());
   motions = orthonormal(to_center * motions);
-  const std::string where = in_words(center, "{:.3g}");
+  const std::string where = origin_in_world.isZero(0)
+                                ? in_words(center, "{:.3g}")
+                                : in_words(origin_in_world + center, "{:.9g}");
   const Eigen::Matrix3Xd turns = take_pure(motions, 0);
   if (turns.cols() > 0) texts.push_back(turn_in_words(turns, where));
   for (Eigen::Index k = 0; k < motions.cols(); ++k) {
@@ -162,7 +165,7 @@ Matrix7 without_normal_noise(const Matrix7& surface_information,
 }
 
 Constraints constraints_of(const Matrix7& surface_information, const Matrix7& prior_covariance,
-                           const Eigen::Vector3d& pivot) {
+                           const Eigen::Vector3d& pivot, const Eigen::Vector3d& origin_in_world) {
   Constraints result;
   result.covariance = (surface_information + Matrix7(prior_covariance.inverse())).inverse();
   result.constrained_share =
@@ -179,7 +182,8 @@ Constraints constraints_of(const Matrix7& surface_information, const Matrix7& pr
         (prior_covariance * eigen.eigenvectors().col(i)).cwiseQuotient(sigma);
   }
   motions.conservativeResize(7, result.open_degrees_of_freedom);
-  if (motions.cols() > 0) result.open_motions = describe(orthonormal(motions), sigma, pivot);
+  if (motions.cols() > 0)
+    result.open_motions = describe(orthonormal(motions), sigma, pivot, origin_in_world);
   return result;
 }
 

@@ -36,8 +36,9 @@ Matrix7 without_normal_noise(const Matrix7& surface_information,
 // The information is that of the surfaces about the seven parameters at `pivot`, the covariance the
 // prior's about the same. The open motions are the eigenvectors of posterior over prior covariance
 // above one half; they span a space that is taken apart into slides, turns about one centre, and
-// growth about it.
+// growth about it. Words name centres in the world that the frame's origin lies in.
 Constraints constraints_of(const Matrix7& surface_information, const Matrix7& prior_covariance,
-                           const Eigen::Vector3d& pivot);
+                           const Eigen::Vector3d& pivot,
+                           const Eigen::Vector3d& origin_in_world = Eigen::Vector3d::Zero());
 
 }  // namespace vggtcd

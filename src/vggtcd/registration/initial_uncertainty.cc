@@ -16,6 +16,17 @@ namespace {
 
 constexpr double kParametersOfAFit = 7;  // taken from the offsets' freedom, per epoch
 
+// Whether the equations leave a motion open. Turns, shifts and growth have different units, so each
+// parameter counts in units of its own diagonal.
+bool is_singular(const Matrix7& information) {
+  constexpr double kSingular = 1e-9;
+  const Vector7 diagonal = information.diagonal();
+  if (!(diagonal.minCoeff() > 0)) return true;
+  const Vector7 unit = diagonal.cwiseSqrt().cwiseInverse();
+  const Eigen::LDLT<Matrix7> solver(unit.asDiagonal() * information * unit.asDiagonal());
+  return !(solver.vectorD().minCoeff() > kSingular * solver.vectorD().maxCoeff());
+}
+
 bool usable(const KeyframeWitness& witness) { return witness.information(3, 3) > 0; }
 
 // The covariance of an epoch's fit about `pivot`, in the joint frame.
@@ -53,10 +64,8 @@ KeyframeWitness keyframe_witness(std::span<const Eigen::Vector3d> mapped,
     witness.information += weights[i] * jacobian.transpose() * jacobian;
     right_side += weights[i] * jacobian.transpose() * (targets[i] - mapped[i]);
   }
-  const Eigen::LDLT<Matrix7> solver(witness.information);
-  constexpr double kSingular = 1e-9;
-  if (solver.vectorD().minCoeff() <= kSingular * solver.vectorD().maxCoeff()) return {};
-  witness.offset = solver.solve(right_side);
+  if (is_singular(witness.information)) return {};
+  witness.offset = Eigen::LDLT<Matrix7>(witness.information).solve(right_side);
   return witness;
 }
 

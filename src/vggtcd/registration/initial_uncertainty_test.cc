@@ -70,6 +70,24 @@ TEST(KeyframeWitness, FindsTheSimilarityThatIsLeft) {
   EXPECT_LT((witness.offset - left).norm(), 1e-5);  // second order of 1e-3
 }
 
+TEST(KeyframeWitness, TheUnitDoesNotDecideWhetherItSaysAnything) {
+  Draw draw(2);
+  Points points, targets;
+  for (int i = 0; i < 50; ++i) points.push_back(Eigen::Vector3d(4, 5, 6) + draw.vector(1));
+  for (const Eigen::Vector3d& x : points) targets.push_back(x + draw.vector(0.01));
+  const Vector7 expected = keyframe_witness(points, targets, ones(points)).offset;
+  ASSERT_GT(expected.norm(), 0);
+  for (const double unit : {1e-9, 1e-6, 1e6}) {
+    Points small = points, small_targets = targets;
+    for (auto* set : {&small, &small_targets}) {
+      for (Eigen::Vector3d& x : *set) x *= unit;
+    }
+    Vector7 found = keyframe_witness(small, small_targets, ones(small)).offset;
+    found.segment<3>(3) /= unit;
+    EXPECT_LT((found - expected).norm(), 1e-9) << unit;
+  }
+}
+
 TEST(KeyframeWitness, TwoPointsOrALineSayNothing) {
   const Points two{{0, 0, 0}, {1, 0, 0}};
   EXPECT_EQ(keyframe_witness(two, two, ones(two)).information.norm(), 0);

@@ -260,7 +260,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   const Constraints constraints =
       constraints_of(held_information(equations.information, pairs, !ties.empty(), photos,
                                       result.pivot_in_t2, spread),
-                     prior_covariance, result.pivot_in_t2);
+                     prior_covariance, result.pivot_in_t2, t2.origin_in_world);
   result.covariance = constraints.covariance;
   result.constrained_share = constraints.constrained_share;
   result.open_degrees_of_freedom = constraints.open_degrees_of_freedom;

@@ -103,7 +103,8 @@ QuantizationBox quantization_box(const ReportCloud& cloud) {
   const std::array<double, 2> percents = {0.1, 99.9};
   const Eigen::Matrix3Xd spread = percentiles(sample, percents);
   const Eigen::Vector3f low = spread.col(0).cast<float>(), high = spread.col(1).cast<float>();
-  const float size = std::max((high - low).maxCoeff(), 1e-6f);
+  const float longest = (high - low).maxCoeff();
+  const float size = longest > 0 ? longest : 1.0f;  // of one place any box will do
   const Eigen::Vector3f margin = Eigen::Vector3f::Constant(size);
   min = min.cwiseMax(low - margin).cwiseMin(low);
   max = max.cwiseMin(high + margin).cwiseMax(high);

@@ -17,11 +17,19 @@
 #include "vggtcd/io/ply.h"
 #include "vggtcd/report/heat_map.h"
 #include "vggtcd/report/overlay_names.h"
+#include "vggtcd/scene/local_frame.h"
 
 namespace vggtcd {
 namespace {
 
 namespace fs = std::filesystem;
+
+Eigen::Vector3d three_numbers(const Json& json, const std::string& where) {
+  const bool good = json.is_array() && json.size() == 3 &&
+                    std::ranges::all_of(json, [](const Json& item) { return item.is_number(); });
+  if (!good) throw_error(ErrorCode::kInput, "{}: expected 3 numbers", where);
+  return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
+}
 
 double positive_member(const Json& json, std::string_view key, const fs::path& file) {
   const Json& value = json_member(json, key, file.string());
@@ -41,13 +49,39 @@ std::string unit_of(const Json& change, const fs::path& file) {
               file.string(), unit->dump());
 }
 
+// Where the results' coordinates are large, the place that the page is drawn about.
+Eigen::Vector3d origin_of(const Json& change, const std::string& unit, const fs::path& file) {
+  const std::string key = "origin_" + unit;
+  const auto origin = change.find(key);
+  if (origin == change.end()) return Eigen::Vector3d::Zero();
+  return three_numbers(*origin, fmt::format("{}: change: {}", file.string(), key));
+}
+
+// The list of changes about that place.
+Json moved_near(Json changes, const Eigen::Vector3d& origin, const fs::path& file) {
+  if (origin.isZero(0) || !changes.is_array()) return changes;
+  const auto move = [&](Json& thing) {
+    if (!thing.is_object() || !thing.contains("center")) return;
+    const Eigen::Vector3d center = three_numbers(thing["center"], file.string() + ": center");
+    const Eigen::Vector3d near = center - origin;
+    thing["center"] = {near.x(), near.y(), near.z()};
+  };
+  for (Json& change : changes) {
+    move(change);
+    for (const char* epoch : {"before", "after"}) {
+      if (change.is_object() && change.contains(epoch)) move(change[epoch]);
+    }
+  }
+  return changes;
+}
+
 std::string input_name(const Json& summary, const char* epoch) {
   const Json::json_pointer path(fmt::format("/inputs/{}/file", epoch));
   return summary.contains(path) && summary[path].is_string() ? summary[path].get<std::string>()
                                                              : epoch;
 }
 
-ReportCloud read_cloud(const fs::path& path) {
+ReportCloud read_cloud(const fs::path& path, const Eigen::Vector3d& origin) {
   const auto ply = std::make_shared<const PlyReader>(path);
   const auto has = [&](const char* name) {
     return std::ranges::find(ply->fields(), name) != ply->fields().end();
@@ -63,9 +97,9 @@ ReportCloud read_cloud(const fs::path& path) {
   cloud.has_labels = has("label");
   std::vector<std::string> fields = {"change_distance"};
   if (cloud.has_labels) fields.push_back("label");
-  cloud.for_each_block = [ply, fields](const auto& sink) {
+  cloud.for_each_block = [ply, fields, origin](const auto& sink) {
     ReportPoints points;
-    ply->read(fields, [&](const PlyCloud& block) {
+    const auto take = [&](const PlyCloud& block) {
       points.positions = block.positions;
       points.color = block.rgb;
       if (points.color.empty()) points.color.assign(3 * points.positions.size(), 128);
@@ -76,19 +110,20 @@ ReportCloud read_cloud(const fs::path& path) {
         points.label.push_back(value >= 0 && value <= 4 ? static_cast<uint8_t>(value) : uint8_t{3});
       }
       sink(points);
-    });
+    };
+    ply->read(fields, take, origin);
   };
   return cloud;
 }
 
 // The cameras of one epoch in the order in which detect wrote them: that of the frames.
 void add_photos(const ColmapModel& model, std::string_view prefix, const fs::path& file,
-                ReportEpoch& epoch) {
+                const Eigen::Vector3d& origin, ReportEpoch& epoch) {
   for (const auto& [id, image] : model.images) {
     if (!image.name.starts_with(prefix)) continue;
     ReportPhoto photo;
     photo.name = image.name.substr(prefix.size());
-    photo.camera_from_world = image.camera_from_world;
+    photo.camera_from_world = camera_from_world(image.camera_from_world, -origin);
     const auto camera = model.cameras.find(image.camera_id);
     if (camera != model.cameras.end() && camera->second.model == "PINHOLE") {
       const std::vector<double>& p =
@@ -170,11 +205,13 @@ ReportInput read_results(const fs::path& directory) try {
   ReportInput input;
   input.summary = read_json_file(summary_path);
   if (exists_at(directory / "sim3.json")) input.sim3 = read_json_file(directory / "sim3.json");
-  if (const fs::path list = directory / "changes.json"; exists_at(list)) {
-    input.changes = json_member(read_json_file(list), "changes", list.string());
-  }
   const Json& change = json_member(input.summary, "change", summary_path.string());
   input.unit = unit_of(change, summary_path);
+  input.origin = origin_of(change, input.unit, summary_path);
+  if (const fs::path list = directory / "changes.json"; exists_at(list)) {
+    input.changes =
+        moved_near(json_member(read_json_file(list), "changes", list.string()), input.origin, list);
+  }
   input.extent_u = positive_member(change, "scene_extent_" + input.unit, summary_path);
   input.threshold_u = positive_member(change, "threshold_" + input.unit, summary_path);
   input.bound_u = positive_member(change, "bound_" + input.unit, summary_path);
@@ -186,9 +223,9 @@ ReportInput read_results(const fs::path& directory) try {
   const auto read_epoch = [&](const char* name, const std::string& suffix, const char* cloud,
                               ReportEpoch& epoch) {
     read_scores(npz, "score_" + suffix, epoch);
-    add_photos(model, fmt::format("{}/", name), directory / "colmap", epoch);
+    add_photos(model, fmt::format("{}/", name), directory / "colmap", input.origin, epoch);
     read_labels(npz, "label_" + suffix, epoch);
-    epoch.cloud = read_cloud(directory / cloud);
+    epoch.cloud = read_cloud(directory / cloud, input.origin);
     epoch.image = photo_reader(directory / "overlays" / name, epoch);
   };
   read_epoch("before", "t1", "before_aligned.ply", input.before);

@@ -103,6 +103,37 @@ TEST(ReadResults, TheListOfChangesIsTakenAsItIs) {
   EXPECT_EQ(read_results(results.directory.path()).changes, list);
 }
 
+TEST(ReadResults, FarFromTheOriginThePageIsDrawnAboutAPlaceNearby) {
+  const Results results;
+  const Eigen::Vector3d origin(691234, 5334321, 0);
+  Json summary = read_json_file(results.directory / "summary.json");
+  summary["change"]["origin_u"] = {origin.x(), origin.y(), origin.z()};
+  write_json_file(results.directory / "summary.json", summary);
+  {
+    PlyWriter ply(results.directory / "after.ply", 1, {"change_distance"}, {}, origin);
+    const uint8_t rgb[] = {1, 2, 3};
+    const float values[] = {0.01f};
+    ply.add({0.125f, 2, 3}, rgb, values);
+    ply.commit();
+  }
+  const Json center = {origin.x() + 1.5, origin.y(), 4.0};
+  write_json_file(
+      results.directory / "changes.json",
+      {{"changes", Json::array({{{"center", center}, {"after", {{"center", center}}}}})}});
+  const ReportInput input = read_results(results.directory.path());
+  EXPECT_EQ(input.origin, origin);
+  input.after.cloud.for_each_block([&](const ReportPoints& points) {
+    EXPECT_EQ(points.positions[0], Eigen::Vector3f(0.125f, 2, 3));
+  });
+  EXPECT_EQ(input.changes[0]["center"], Json({1.5, 0.0, 4.0}));
+  EXPECT_EQ(input.changes[0]["after"]["center"], Json({1.5, 0.0, 4.0}));
+  // The cameras of these results stand near zero: from the page's place they are far.
+  EXPECT_EQ(input.after.photos[0].camera_from_world->translation.y(), origin.y());
+  summary["change"]["origin_u"] = {1, 2};
+  write_json_file(results.directory / "summary.json", summary);
+  EXPECT_INPUT_ERROR(read_results(results.directory.path()), "origin_u: expected 3 numbers");
+}
+
 TEST(ReadResults, WhatIsMissingOrDoesNotFitIsNamed) {
   const TemporaryDirectory empty;
   EXPECT_INPUT_ERROR(read_results(empty.path()), "no summary.json");

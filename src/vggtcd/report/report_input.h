@@ -16,7 +16,7 @@
 
 namespace vggtcd {
 
-// Points in the T2 frame; arrays of one length.
+// Points in the T2 frame, less ReportInput::origin; arrays of one length.
 struct ReportPoints {
   std::vector<Eigen::Vector3f> positions;
   std::vector<uint8_t> color;          // [N, 3] RGB
@@ -52,8 +52,10 @@ struct ReportEpoch {
 };
 
 struct ReportInput {
-  std::string title;                         // what was compared
-  std::string unit = "u";                    // of all lengths: model units, or "m" once metric
+  std::string title;       // what was compared
+  std::string unit = "u";  // of all lengths: model units, or "m" once metric
+  // What clouds, cameras and changes are relative to, in the coordinates of the results' files.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
   double extent_u = 0;                       // robust size of the scene
   double threshold_u = 0;                    // beyond it a point is changed
   double bound_u = 0;                        // scores are exact below

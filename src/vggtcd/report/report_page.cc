@@ -271,6 +271,9 @@ ReportData make_report_data(const ReportInput& input, const ReportOptions& optio
                                  clouds.shares.changed_before, false, blocks),
                       cloud_json(input.after.cloud, after, clouds.after,
                                  clouds.shares.changed_after, true, blocks)};
+  if (!input.origin.isZero(0)) {
+    header["origin"] = {input.origin.x(), input.origin.y(), input.origin.z()};
+  }
   header["photos"] = Json::array();
   for (size_t i = 0; i < photos.before.size(); ++i) {
     header["photos"].push_back(photo_json(input.before.photos[i], photos.before[i], false, blocks));

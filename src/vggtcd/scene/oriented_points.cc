@@ -154,6 +154,7 @@ OrientedPoints oriented_points(const Reconstruction& reconstruction, int grid_re
   surfels.insert(surfels.end(), others.begin(), others.end());
   std::ranges::sort(surfels, {}, &Surfel::point);
 
+  result.origin_in_world = reconstruction.origin_in_world;
   for (const View& view : reconstruction.views) {
     result.cameras.push_back(camera_center(view.camera_from_world));
   }

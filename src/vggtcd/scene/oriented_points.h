@@ -15,8 +15,9 @@ namespace vggtcd {
 struct OrientedPoints {
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;
-  std::vector<int32_t> frames;           // the frame each point was taken from
-  std::vector<Eigen::Vector3d> cameras;  // the centre of every frame's camera
+  std::vector<int32_t> frames;                                // the frame each point was taken from
+  std::vector<Eigen::Vector3d> cameras;                       // the centre of every frame's camera
+  Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();  // the reconstruction's
   double voxel_size_u = 0;
 
   size_t size() const { return positions.size(); }

@@ -32,6 +32,9 @@ struct Reconstruction {
   std::vector<float> depth;  // [S, H, W], z along the optical axis in model units, >= 0, finite
   std::vector<float> confidence;  // [S, H, W], only ever ranked; not a probability
   std::vector<uint8_t> color;     // [S, H, W, 3] RGB
+  // Where this frame's origin lies in the world of the file that was read; the axes and the unit
+  // are the file's. Not zero only where the file's own origin is far away (local_frame.h).
+  Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();
 
   int num_frames() const { return static_cast<int>(views.size()); }
   size_t pixels_per_frame() const {
