@@ -2,10 +2,10 @@
 // JSON files and options structs as JSON.
 #include "vggtcd/io/json_file.h"
 
-#include <fstream>
-#include <iterator>
+#include <cmath>
 #include <limits>
 
+#include "vggtcd/io/file_bytes.h"
 #include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
@@ -51,11 +51,7 @@ bool integer_to(const Json& json, T& value) {
 }  // namespace
 
 Json read_json_file(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw_error(ErrorCode::kInput, "{}: expected a readable JSON file", path.string());
-  }
-  const std::string text(std::istreambuf_iterator<char>(file), {});
+  const std::string text = read_file_bytes(path);
   if (too_deep(text)) {
     throw_error(ErrorCode::kInput, "{}: expected JSON nested at most 100 deep", path.string());
   }
@@ -64,6 +60,9 @@ Json read_json_file(const std::filesystem::path& path) {
   } catch (const Json::parse_error& error) {
     throw_error(ErrorCode::kInput, "{}: expected JSON, found something else at byte {}",
                 path.string(), error.byte);
+  } catch (const Json::out_of_range&) {
+    throw_error(ErrorCode::kInput, "{}: expected JSON, found a number that no double can hold",
+                path.string());
   }
 }
 
@@ -98,6 +97,7 @@ bool json_to(const Json& json, double& value) {
 bool json_to(const Json& json, float& value) {
   double number = 0;
   if (!json_to(json, number)) return false;
+  if (std::abs(number) > static_cast<double>(std::numeric_limits<float>::max())) return false;
   value = static_cast<float>(number);
   return true;
 }

@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <type_traits>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
+#include "vggtcd/io/file_bytes.h"
 #include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
@@ -163,9 +163,12 @@ bool is_exactly(const NpyHeader& header) {
 }
 
 void append_utf8(std::string& text, uint32_t code, std::string_view what) {
-  if (code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) {
+  if (code > 0x10ffff) {
     throw_error(ErrorCode::kInput, "{}: expected Unicode text, found code point {:#x}", what, code);
   }
+  // Python keeps bytes of names that are not UTF-8 as single surrogates, which no UTF-8 can hold.
+  constexpr uint32_t kReplacement = 0xfffd;
+  if (code >= 0xd800 && code < 0xe000) code = kReplacement;
   const auto tail = [&](unsigned shift) {
     text += static_cast<char>(0x80 | ((code >> shift) & 0x3f));
   };
@@ -247,21 +250,18 @@ std::vector<std::string> read_npy_strings(const NpyHeader& header, const ReadByt
 
 NpyDoubles read_npy_file(const std::filesystem::path& path) {
   const std::string what = path.string();
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) {
-    throw_error(ErrorCode::kInput, "{}: expected a readable .npy file, found {}", what,
-                std::filesystem::exists(path) ? "something that cannot be opened" : "nothing");
-  }
-  const ReadBytes read = [&](std::span<std::byte> bytes) {
-    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (static_cast<size_t>(file.gcount()) != bytes.size()) {
+  const std::string bytes = read_file_bytes(path);
+  size_t position = 0;
+  const ReadBytes read = [&](std::span<std::byte> target) {
+    if (target.size() > bytes.size() - position) {
       throw_error(ErrorCode::kInput, "{}: expected more data, found the end of the file", what);
     }
+    std::copy_n(bytes.data() + position, target.size(), reinterpret_cast<char*>(target.data()));
+    position += target.size();
   };
   const NpyHeader header = read_npy_header(read, what);
   // Before memory is reserved: the file must have what the header promises.
-  const auto position = static_cast<int64_t>(file.tellg());
-  const auto left = static_cast<int64_t>(std::filesystem::file_size(path)) - position;
+  const auto left = static_cast<int64_t>(bytes.size() - position);
   if (header.item_size > 0 && header.data_bytes() != left) {
     throw_error(ErrorCode::kInput, "{}: expected {} bytes of data, found {}", what,
                 header.data_bytes(), left);

@@ -58,7 +58,8 @@ template <typename T>
 void read_npy_array(const NpyHeader& header, const ReadBytes& read, std::string_view what,
                     std::span<T> target);
 
-// The strings of a <U or |S array as UTF-8 without the padding.
+// The strings of a <U or |S array as UTF-8 without the padding; what is no character (a single
+// surrogate) becomes U+FFFD.
 std::vector<std::string> read_npy_strings(const NpyHeader& header, const ReadBytes& read,
                                           std::string_view what);
 

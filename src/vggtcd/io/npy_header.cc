@@ -202,12 +202,12 @@ NpyHeader read_npy_header(const ReadBytes& read, std::string_view what) {
       std::all_of(text.begin(), text.end(), [](unsigned char c) { return c >= 0x20 || c == '\n'; });
   std::optional<NpyHeader> header =
       printable ? DictParser(text).parse() : std::optional<NpyHeader>();
+  if (header) decode_type(*header);  // the size in bytes depends on it
   if (!header || size_overflows(*header)) {
     throw_error(ErrorCode::kInput, "{}: expected an array header as NumPy writes it, found {}",
                 what,
                 header ? "the impossible shape " + shape_string(header->shape) : "other text");
   }
-  decode_type(*header);
   if (header->shape.size() < 2) header->fortran_order = false;
   return *std::move(header);
 }
