@@ -3,6 +3,7 @@
 #include "vggtcd/io/trajectory.h"
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/io/colmap.h"
 #include "vggtcd/io/npy.h"
@@ -31,20 +32,40 @@ Trajectory read_npy_poses(const std::filesystem::path& path, PoseConvention conv
   return trajectory;
 }
 
+bool are_numbers_in_order(const Trajectory& trajectory) {
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    if (signed_number_in(trajectory[i].name) != static_cast<double>(i)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-Trajectory read_trajectory(const std::filesystem::path& path, PoseConvention npy_convention) {
-  if (!std::filesystem::exists(path)) {
+TrajectoryFile read_trajectory_file(const std::filesystem::path& path,
+                                    PoseConvention npy_convention) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
     throw_error(ErrorCode::kInput,
                 "{}: expected poses (.npy), a COLMAP model or a TUM file, found nothing",
                 path.string());
   }
-  if (path.extension() == ".npy") return read_npy_poses(path, npy_convention);
-  if (std::filesystem::is_directory(path)) return colmap_trajectory(read_colmap(path));
-  if (path.filename() == "images.txt" || path.filename() == "images.bin") {
-    return colmap_trajectory(read_colmap(path.parent_path().empty() ? "." : path.parent_path()));
+  const bool is_directory = std::filesystem::is_directory(path, ignored);
+  if (path.extension() == ".npy" && !is_directory) {
+    return {read_npy_poses(path, npy_convention), PoseNames::kNumbers};
   }
-  return read_tum(path);
+  if (is_directory) return {read_colmap_trajectory(path), PoseNames::kPhotos};
+  if (path.filename() == "images.txt" || path.filename() == "images.bin") {
+    const std::filesystem::path folder = path.parent_path();
+    return {read_colmap_trajectory(folder.empty() ? "." : folder), PoseNames::kPhotos};
+  }
+  Trajectory poses = read_tum(path);
+  const PoseNames names =
+      are_numbers_in_order(poses) ? PoseNames::kNumbers : PoseNames::kTimeStamps;
+  return {std::move(poses), names};
+}
+
+Trajectory read_trajectory(const std::filesystem::path& path, PoseConvention npy_convention) {
+  return read_trajectory_file(path, npy_convention).poses;
 }
 
 void write_npy_poses(const std::filesystem::path& path, std::span<const NamedPose> trajectory,
