@@ -85,6 +85,9 @@ void add_info(Program& program, CLI::App& parent) {
         const WeightFile file = open_weight_file(*path);
         fmt::print("{:<13}{}\n", "file", *path);
         fmt::print("{:<13}{}\n", "format", weight_format_name(file.format));
+        if (!file.removed_prefix.empty()) {
+          fmt::print("{:<13}{} before every name, left out\n", "prefix", file.removed_prefix);
+        }
         print_precision(file);
         const CheckpointReport report = inspect_checkpoint(file, *path);
         print_network(report, file.metadata.contains("config"));

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <regex>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/safetensors.h"
 #include "vggtcd/io/torch_checkpoint.h"
+#include "vggtcd/io/weight_shards.h"
 
 namespace vggtcd {
 namespace {
@@ -34,6 +36,41 @@ void throw_if_text(std::string_view start, const std::string& name) {
   if (printable) {
     throw_error(ErrorCode::kWeights, "{}: expected weights, found text; download the file again",
                 name);
+  }
+}
+
+// One of several files is taken for the whole only when its tensors are missed: say it at once.
+void throw_if_shard(const std::filesystem::path& path) {
+  static const std::regex kShard("-[0-9]{5}-of-([0-9]{5})\\.[a-z]+$");
+  std::smatch match;
+  const std::string name = path.filename().string();
+  if (!std::regex_search(name, match, kShard) || match[1] == "00001") return;
+  throw_error(ErrorCode::kWeights,
+              "{}: expected a whole checkpoint, found one of {} shards; name the folder, or the "
+              "index (model.safetensors.index.json) beside it",
+              path.string(), std::stoi(match[1]));
+}
+
+// Without what wrappers put before every name; torch.compile also wraps parts of a network.
+void remove_wrappers(WeightFile& file) {
+  constexpr std::array<std::string_view, 3> kWrappers = {"module.", "_orig_mod.", "model."};
+  const auto all_begin_with = [&](std::string_view prefix) {
+    return std::ranges::all_of(file.tensors, [&](const TensorView& tensor) {
+      return tensor.name.size() > prefix.size() && tensor.name.starts_with(prefix);
+    });
+  };
+  for (bool more = !file.tensors.empty(); more;) {
+    const auto* wrapper = std::ranges::find_if(kWrappers, all_begin_with);
+    more = wrapper != kWrappers.end();
+    if (!more) break;
+    for (TensorView& tensor : file.tensors) tensor.name.erase(0, wrapper->size());
+    file.removed_prefix += *wrapper;
+  }
+  constexpr std::string_view kCompiledPart = "._orig_mod.";
+  for (TensorView& tensor : file.tensors) {
+    for (size_t at; (at = tensor.name.find(kCompiledPart)) != std::string::npos;) {
+      tensor.name.erase(at, kCompiledPart.size() - 1);
+    }
   }
 }
 
@@ -74,16 +111,25 @@ WeightFile parse_weight_file(std::span<const std::byte> bytes, const std::string
               "{}: expected safetensors or a PyTorch checkpoint, found neither", name);
 }
 
-WeightFile open_weight_file(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) {
+WeightFile open_weight_file(const std::filesystem::path& given) {
+  const std::filesystem::path path = weight_path(given);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) {
     throw_error(ErrorCode::kWeights, "{}: expected network weights, found no such file",
                 path.string());
   }
+  if (const auto index = read_shard_index(path)) {
+    WeightFile file = open_shards(*index);
+    remove_wrappers(file);
+    return file;
+  }
+  throw_if_shard(path);
   const auto mapped = std::make_shared<const MappedFile>(path);
   WeightFile file = parse_weight_file(mapped->bytes(), path.string());
   // Both the mapping and what the parser had to copy must live as long as the tensors.
   file.storage = std::make_shared<const std::array<std::shared_ptr<const void>, 2>>(
       std::array<std::shared_ptr<const void>, 2>{mapped, file.storage});
+  remove_wrappers(file);
   return file;
 }
 

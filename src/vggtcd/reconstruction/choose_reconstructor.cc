@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 
+#include "vggtcd/io/weight_shards.h"
 #include "vggtcd/reconstruction/classical_reconstructor.h"
 #include "vggtcd/reconstruction/vggt_reconstructor.h"
 
@@ -46,13 +47,12 @@ std::filesystem::path require_weights(const std::string& given) {
                 "~/.local/share/vggt-cd/model.safetensors; {}",
                 kWithoutWeights);
   }
-  if (!std::filesystem::is_regular_file(weights)) {
-    throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found {}; {}",
-                given.empty() ? "VGGTCD_WEIGHTS: " : "", weights,
-                std::filesystem::exists(weights) ? "no file but a directory" : "no such file",
-                kWithoutWeights);
+  std::error_code ignored;
+  if (!std::filesystem::exists(weights, ignored)) {
+    throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found no such file; {}",
+                given.empty() ? "VGGTCD_WEIGHTS: " : "", weights, kWithoutWeights);
   }
-  return weights;
+  return weight_path(weights);  // of a folder
 }
 
 std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,
