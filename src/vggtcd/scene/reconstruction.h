@@ -32,6 +32,13 @@ struct Reconstruction {
   std::vector<float> depth;  // [S, H, W], z along the optical axis in model units, >= 0, finite
   std::vector<float> confidence;  // [S, H, W], only ever ranked; not a probability
   std::vector<uint8_t> color;     // [S, H, W, 3] RGB
+  // Frames that the prediction file has and this has not (nobody knows where they were taken), by
+  // their numbers in the file, ascending. Whoever names a frame by a number means the file's.
+  std::vector<int> left_out{};
+
+  int frames_in_file() const { return num_frames() + static_cast<int>(left_out.size()); }
+  std::optional<int> frame_of_number(int number_in_file) const;  // nothing: left out, or not there
+  int number_of_frame(int frame) const;
 
   int num_frames() const { return static_cast<int>(views.size()); }
   size_t pixels_per_frame() const {
@@ -61,8 +68,11 @@ struct JointReconstruction {
 };
 
 // The frame that shows the photo of this name; or, if no photo is called so, the frame of this
-// number from 0 (a name wins over a number: photos may be named 0, 1, 2 in another order).
+// number in the file from 0 (a name wins over a number: photos may be named 0, 1, 2 anyhow).
 std::optional<int> find_frame(const Reconstruction& reconstruction, std::string_view photo);
+
+// Removes the frames k with remove[k] and notes them in left_out, which must be empty.
+void remove_frames(Reconstruction& reconstruction, const std::vector<bool>& remove);
 
 // Throws Error{kInternal} unless the arrays have the sizes that the header promises. For readers
 // and generators of reconstructions: what they hand over has passed this.
