@@ -161,12 +161,11 @@ void expect_intrinsics_of_frames(const std::string& where, const Views& all) {
   }
   if (known == 0 || (outside < known && in_corner < known)) return;
   throw_error(ErrorCode::kInput,
-              "{}: expected intrinsics in pixels of the frames of {} x {}, found the principal "
-              "point at ({:.6g}, {:.6g}){}, {} in every frame; scale fx, cx by {} / width and fy, "
-              "cy by {} / height of the picture that they are of",
+              "{}: expected intrinsics in pixels of the frames of {} x {}, found a principal point "
+              "({:.6g}, {:.6g}) {} of the frame, and so in every frame; scale fx, cx by {} / width "
+              "and fy, cy by {} / height of the picture that they are of",
               where, first->width, first->height, first->cx, first->cy,
-              known > 1 ? " and so on" : "", outside == known ? "outside" : "in the corner pixel",
-              first->width, first->height);
+              outside == known ? "outside" : "in the corner pixel", first->width, first->height);
 }
 
 Views read_views(const NpzReader& npz, const PredictionLayout& layout) {

@@ -321,7 +321,17 @@ TEST(ReadReconstruction, IntrinsicsOfAnotherPictureSizeAreRefused) {
   Fixture f;
   EXPECT_INPUT_ERROR(f.read(scaled(20, 20, kFrames)),
                      "t1.npz: intrinsic: expected intrinsics in pixels of the frames of 8 x 6");
-  EXPECT_INPUT_ERROR(f.read(scaled(20, 20, kFrames)), "outside in every frame");
+  EXPECT_INPUT_ERROR(f.read(scaled(20, 20, kFrames)),
+                     "outside of the frame, and so in every frame");
+  // Shares of the width and height, in frames that are no few pixels.
+  Arrays shares;
+  shares.set("extrinsic", {2, 3, 4}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0,  //
+                                      1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0});
+  shares.set("intrinsic", {2, 3, 3},
+             {0.8f, 0, 0.5f, 0, 1.1f, 0.5f, 0, 0, 1,  //
+              0.8f, 0, 0.5f, 0, 1.1f, 0.5f, 0, 0, 1});
+  shares.set("depth", {2, 12, 16}, std::vector<float>(2 * 12 * 16, 1));
+  EXPECT_INPUT_ERROR(f.read(shares), "(0.5, 0.5) in the corner pixel of the frame");
   // One frame that was cut off centre may be right. The points are of the others' cameras.
   Arrays cropped = scaled(20, 20, 1);
   cropped.remove("world_points"), cropped.remove("world_points_from_depth");
