@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zipfile
 
 import numpy as np
 
@@ -686,6 +687,114 @@ class UnusualNames(unittest.TestCase):
         done = run("view", out)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertLess((out / "report.html").stat().st_size, page)  # it found the overlays under these names
+
+
+class FieldFiles(unittest.TestCase):
+    """Files as programs and people of the field save them."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.root = pathlib.Path(cls.temporary.name)
+        cls.t1 = dict(np.load(EXAMPLE / "t1.npz"))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def save(self, name, **changes):
+        np.savez(self.root / name, **{**self.t1, **changes})
+        return self.root / name
+
+    def register(self, t1, name):
+        out = self.root / name
+        done = run("register", t1, EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz", "-o", out)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return json.loads((out / "sim3.json").read_text()), done.stderr
+
+    def test_side_members_and_names_that_are_no_text_change_nothing(self):
+        frames = len(self.t1["extrinsic"])
+        plain, _ = self.register(EXAMPLE / "t1.npz", "plain")
+        latin = [b"K\xfcche_%d.jpg" % i for i in range(frames)]
+        saved = self.save("latin.npz", names=np.array([n.decode("utf-8", "surrogateescape") for n in latin]))
+        packed = self.root / "packed.npz"
+        with zipfile.ZipFile(saved) as a, zipfile.ZipFile(packed, "w") as b:
+            for name in a.namelist():
+                b.writestr(name, a.read(name))
+                b.writestr("__MACOSX/._" + name, b"\0\5\x16\7\0\2\0\0Mac OS X        " + bytes(80))
+        self.assertEqual(self.register(packed, "packed")[0], plain)
+
+    def test_frames_that_tracking_lost_are_left_out_and_named(self):
+        joint = np.load(EXAMPLE / "joint.npz")
+        lost = next(i for i in range(len(self.t1["extrinsic"])) if i not in joint["keyframes_t1"])
+        poses = self.t1["extrinsic"].copy()
+        poses[lost] = -np.inf
+        sim3, notices = self.register(self.save("lost.npz", extrinsic=poses), "lost")
+        self.assertRegex(notices, r"lost\.npz: frames whose pose .* are left out: \S+")
+        whole, _ = self.register(EXAMPLE / "t1.npz", "whole")
+        self.assertAlmostEqual(sim3["scale"] / whole["scale"], 1, delta=0.02)
+
+    def test_intrinsics_of_the_full_size_photos_are_named(self):
+        k = self.t1["intrinsic"].copy()
+        k[:, :2] *= 20
+        done = run("detect", self.save("full.npz", intrinsic=k), EXAMPLE / "t2.npz", "--aligned", "-o", self.root / "x")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertRegex(done.stderr, r"^vggt-cd: .*full\.npz: intrinsic: expected intrinsics in pixels of the frames")
+
+    def test_names_with_spaces_reach_colmap(self):
+        names = np.array([f"photo ({i + 1}).jpg" for i in range(len(self.t1["extrinsic"]))])
+        out = self.root / "spaces"
+        done = run("detect", self.save("spaces.npz", names=names), EXAMPLE / "t2.npz", "--joint",
+                   EXAMPLE / "joint.npz", "-o", out, "--no-page")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        binary = (out / "colmap" / "images.bin").read_bytes()
+        for name in names:
+            self.assertIn(b"before/" + name.encode() + b"\0", binary)
+
+    def test_text_models_and_time_stamps_are_paired_as_they_are_meant(self):
+        rng = np.random.default_rng(1)
+        centers = rng.normal(size=(12, 3))
+
+        def tum(name, order, stamp=lambda i: f"{1305031102 + i / 30:.6f}"):
+            lines = [f"{stamp(i)} {' '.join(repr(float(v)) for v in centers[i])} 0 0 0 1\n" for i in order]
+            (self.root / name).write_text("".join(lines))
+            return self.root / name
+
+        def ate(before, after, *truth):
+            done = run("evaluate", before, after, *truth, "-o", self.root / "scores.json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            scores = json.loads((self.root / "scores.json").read_text())
+            self.assertLess(scores["ate_mean"], 1e-9)
+            return scores["frames"], done.stderr
+
+        truth = tum("truth.tum", range(12))
+        both = ("--truth-before", truth, "--truth-after", truth)
+        self.assertEqual(ate(truth, tum("joined.tum", [*range(6, 12), *range(6)]), *both)[0], 24)
+        frames, notices = ate(truth, tum("lost_first.tum", range(1, 12)), "--truth-before", truth,
+                              "--truth-after", tum("lost_last.tum", range(11)))
+        self.assertEqual(frames, 12 + 10)
+        self.assertIn("lost_first.tum: 1 of 11 poses have no partner", notices)
+        numbered = tum("numbered.tum", range(12), str)
+        self.assertEqual(ate(numbered, numbered, *both)[0], 24)
+        self.assertEqual(run("evaluate", numbered, numbered, "--truth-before", truth,
+                             "--truth-after", self.root / "joined.tum").returncode, 3)
+        # Image ids as COLMAP gives them, names as ffmpeg counts; frame_2 comes before frame_10.
+        model = self.root / "model"
+        model.mkdir()
+        (model / "images.txt").write_text("".join(
+            f"{first - i} 1 0 0 0 {' '.join(repr(float(-v)) for v in centers[i])} 1 {e}/frame_{i + 1}.jpg\n\n"
+            for e, first in (("before", 100), ("after", 50)) for i in range(12)))
+        self.assertEqual(ate(numbered, numbered, "--truth", model)[0], 24)
+
+    def test_numbers_that_no_place_has_are_named(self):
+        good = self.root / "good.tum"
+        good.write_text("".join(f"{i} {i * 0.1} {i * i * 0.01} 0 0 0 0 1\n" for i in range(6)))
+        for number in ("1e308", "-1.7e308"):
+            bad = self.root / "bad.tum"
+            bad.write_text(good.read_text().replace("0.2 ", number + " ", 1))
+            done = run("evaluate", bad, good, "--truth-before", good, "--truth-after", good)
+            self.assertEqual(done.returncode, 3, done.stderr)
+            self.assertIn(f"bad.tum:3: expected coordinates from -1e13 to 1e13, found {number}", done.stderr)
 
 
 class Help(unittest.TestCase):

@@ -10,6 +10,7 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -186,6 +187,28 @@ class BadInput(unittest.TestCase):
 
     def test_missing_colmap(self):
         self.assertIn("install COLMAP", self.refusal(status=8, env={"PATH": str(self.root)}))
+
+    def test_a_colmap_that_returns_other_photos_is_named(self):
+        """A colmap on the PATH that answers with a model of one photo that it was not given."""
+        for epoch, first in (("before", 40), ("after", 60)):
+            for i in range(4, 12):
+                write_photo(self.root / epoch / f"{i}.ppm", first + i)
+        model, tools = self.root / "model", self.root / "tools"
+        model.mkdir(), tools.mkdir()
+        (model / "cameras.bin").write_bytes(struct.pack("<QIiQQ4d", 1, 1, 2, 96, 64, 90, 48, 32, 0))
+        (model / "images.bin").write_bytes(
+            struct.pack("<QI7dI", 1, 1, 1, 0, 0, 0, 0, 0, 0, 1) + b"other\x1b[31m.pgm\0" + struct.pack("<Q", 0))
+        (model / "points3D.bin").write_bytes(struct.pack("<Q", 0))
+        colmap = tools / "colmap"
+        colmap.write_text(f"""#!/bin/sh
+[ "$1" = mapper ] || exit 0
+while [ "$1" != --output_path ]; do shift; done
+cp -r {model} "$2/0"
+""")
+        colmap.chmod(0o755)
+        line = self.refusal("--frame-side", 56, status=8, env={"PATH": f"{tools}:{os.environ['PATH']}"})
+        self.assertIn(r'"other\x1b[31m.pgm"', line)
+        self.assertIn("colmap: expected each of the 24 photos", line)
 
     def test_a_video_without_frames(self):
         (self.root / "broken.mp4").write_bytes(b"nothing")

@@ -180,6 +180,40 @@ class Weights(WithTinyNetwork):
         self.assertIn("depth_head has 61 of 62 tensors", done.stderr)
         broken.unlink()
 
+    def test_wrapped_and_sharded_checkpoints_are_the_same_network(self):
+        header, data = self.parts()
+        meta = header.pop("__metadata__", {})
+        ddp, hub = self.root / "ddp.safetensors", self.root / "hub"
+        self.write(ddp, {"__metadata__": meta, **{"module._orig_mod." + k: v for k, v in header.items()}}, data)
+        hub.mkdir()
+        names, where = list(header), {}
+        for part, some in enumerate((names[::2], names[1::2]), 1):
+            file, shard, bytes_ = f"model-0000{part}-of-00002.safetensors", {"__metadata__": meta}, b""
+            for name in some:
+                begin, end = header[name]["data_offsets"]
+                shard[name] = {**header[name], "data_offsets": [len(bytes_), len(bytes_) + end - begin]}
+                bytes_ += data[begin:end]
+                where[name] = file
+            self.write(hub / file, shard, bytes_)
+        index = hub / "model.safetensors.index.json"
+        index.write_text(json.dumps({"metadata": {"total_size": len(data)}, "weight_map": where}))
+        images = self.root / "images.npz"
+        np.savez(images, images=np.random.default_rng(1).random((2, 3, 56, 56), dtype=np.float32))
+        results = set()
+        for weights in (self.weights, ddp, index, hub):
+            out = self.root / "o.npz"
+            done = run("reconstruct", images, "-o", out, "--weights", weights)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            results.add(out.read_bytes())
+            out.unlink()
+        self.assertEqual(len(results), 1)
+        done = run("weights", "info", ddp)
+        self.assertRegex(done.stdout, r"prefix +module\._orig_mod\. before every name")
+        self.assert_fails(WEIGHTS, ["one of 2 shards"], "weights", "info", hub / "model-00001-of-00002.safetensors")
+        (hub / "model-00002-of-00002.safetensors").unlink()
+        self.assert_fails(WEIGHTS, ["expected its shard"], "weights", "info", hub)
+        shutil.rmtree(hub), ddp.unlink(), images.unlink()
+
     def test_convert_to_bf16_halves_the_file(self):
         out = self.root / "half.safetensors"
         self.assertEqual(run("weights", "convert", self.weights, "-o", out).returncode, 0)

@@ -2,10 +2,11 @@
 // vggt-cd evaluate: cameras against known poses, results of detect against the truth.
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <set>
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/standard_streams.h"
+#include "vggtcd/evaluation/pose_pairs.h"
 #include "vggtcd/evaluation/results_scores.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/sim3_file.h"
@@ -24,55 +25,74 @@ PoseConvention convention_of(const std::string& name) {
                                      : PoseConvention::kWorldFromCamera;
 }
 
-std::vector<Rigid3> poses_of(const Trajectory& trajectory) {
-  std::vector<Rigid3> poses;
-  for (const NamedPose& pose : trajectory) poses.push_back(pose.camera_from_world);
-  return poses;
+TrajectoryFile read_poses(const std::string& path, const std::string& convention) {
+  return read_trajectory_file(path, convention_of(convention));
 }
 
-std::vector<Rigid3> read_poses(const std::string& path, const std::string& convention) {
-  return poses_of(read_trajectory(path, convention_of(convention)));
-}
+// The true cameras of both epochs, and the files they are from.
+struct Truth {
+  TrajectoryFile t1, t2;
+  std::string t1_file, t2_file;
+};
 
 // A COLMAP model of both epochs: images named SEQUENCE/FILE; the first folder is T1 (or the one
 // named "before").
-BitemporalTrajectory split_by_folder(const Trajectory& all, const std::string& path) {
-  std::vector<std::string> folders;
+Truth split_by_folder(const TrajectoryFile& all, const std::string& path) {
   const auto folder_of = [](const NamedPose& pose) {
     return pose.name.substr(0, pose.name.find_last_of('/') + 1);
   };
-  for (const NamedPose& pose : all) {
-    if (std::find(folders.begin(), folders.end(), folder_of(pose)) == folders.end())
-      folders.push_back(folder_of(pose));
-  }
-  std::sort(folders.begin(), folders.end());
-  if (folders.size() != 2) {
+  std::set<std::string> names;
+  for (const NamedPose& pose : all.poses) names.insert(folder_of(pose));
+  if (names.size() != 2) {
     throw_error(
         ErrorCode::kInput,
         "{}: expected images in two folders, one per epoch, found {}; use --truth-before and "
         "--truth-after",
-        path, folders.size());
+        path, names.size());
   }
+  std::vector<std::string> folders(names.begin(), names.end());
   if (folders[1] == "before/") std::swap(folders[0], folders[1]);
-  BitemporalTrajectory result;
-  for (const NamedPose& pose : all) {
-    (folder_of(pose) == folders[0] ? result.t1 : result.t2).push_back(pose.camera_from_world);
+  Truth result{{{}, all.names}, {{}, all.names}, path, path};
+  for (const NamedPose& pose : all.poses) {
+    (folder_of(pose) == folders[0] ? result.t1 : result.t2).poses.push_back(pose);
   }
   return result;
 }
 
-BitemporalTrajectory read_truth(const Arguments& arguments) {
-  if (!arguments.truth.empty()) {
-    if (arguments.truth.ends_with(".npz")) return read_true_cameras(arguments.truth);
-    return split_by_folder(read_trajectory(arguments.truth, convention_of(arguments.poses)),
-                           arguments.truth);
+TrajectoryFile numbered(const std::vector<Rigid3>& poses) {
+  TrajectoryFile file;
+  for (const Rigid3& pose : poses) file.poses.push_back({std::to_string(file.poses.size()), pose});
+  return file;
+}
+
+Truth read_truth(const Arguments& arguments) {
+  const std::string& path = arguments.truth;
+  if (path.ends_with(".npz")) {
+    const BitemporalTrajectory cameras = read_true_cameras(path);
+    return {numbered(cameras.t1), numbered(cameras.t2), path, path};
   }
+  if (!path.empty()) return split_by_folder(read_poses(path, arguments.poses), path);
   if (arguments.truth_before.empty() || arguments.truth_after.empty()) {
     throw_error(ErrorCode::kUsage,
                 "truth: expected --truth, or --truth-before and --truth-after, found neither");
   }
   return {read_poses(arguments.truth_before, arguments.poses),
-          read_poses(arguments.truth_after, arguments.poses)};
+          read_poses(arguments.truth_after, arguments.poses), arguments.truth_before,
+          arguments.truth_after};
+}
+
+PosePairs pair_and_tell(const std::string& path, const std::string& convention,
+                        const TrajectoryFile& truth, const std::string& truth_file,
+                        ProgressSink& progress) {
+  const PosePairs pairs = pair_poses(read_poses(path, convention), path, truth, truth_file);
+  const auto tell = [&](size_t alone, const std::string& file, const std::string& other) {
+    if (alone == 0) return;
+    progress.notice(fmt::format("{}: {} of {} poses have no partner in {} and are left out", file,
+                                alone, alone + pairs.truth.size(), other));
+  };
+  tell(pairs.predicted_alone, path, truth_file);
+  tell(pairs.truth_alone, truth_file, path);
+  return pairs;
 }
 
 Json change_json(const ChangeScores& scores) {
@@ -124,17 +144,20 @@ void run_change(const Arguments& arguments) {
                                       {"every_pixel", change_json(s.every_pixel)}});
 }
 
-void run(const Arguments& arguments) {
+void run(const Arguments& arguments, ProgressSink& progress) {
   if (!arguments.change.empty()) return run_change(arguments);
   if (arguments.before.empty() || arguments.after.empty()) {
     throw_error(ErrorCode::kUsage,
                 "expected the cameras BEFORE and AFTER, or --change with results of detect");
   }
   const Sim3 t2_from_t1 = arguments.sim3.empty() ? Sim3{} : read_sim3(arguments.sim3);
-  const std::vector<Rigid3> before = read_poses(arguments.before, arguments.poses);
-  const std::vector<Rigid3> after = read_poses(arguments.after, arguments.poses);
-  const TrajectoryErrors e =
-      evaluate_trajectory(register_trajectory(before, after, t2_from_t1), read_truth(arguments));
+  const Truth truth = read_truth(arguments);
+  const PosePairs t1 =
+      pair_and_tell(arguments.before, arguments.poses, truth.t1, truth.t1_file, progress);
+  const PosePairs t2 =
+      pair_and_tell(arguments.after, arguments.poses, truth.t2, truth.t2_file, progress);
+  const TrajectoryErrors e = evaluate_trajectory(
+      register_trajectory(t1.predicted, t2.predicted, t2_from_t1), {t1.truth, t2.truth});
   print_answer(
       "frames                    {:>12}\n"
       "ATE mean                  {:>12.6g}\n"
@@ -168,7 +191,7 @@ void add_evaluate(Program& program) {
                   "Compare cameras of both epochs with known poses (ATE, RTE, RRE), or "
                   "all of detect's results with "
                   "the truth of a generated scene.",
-                  [arguments](ProgressSink&) { run(*arguments); });
+                  [arguments](ProgressSink& progress) { run(*arguments, progress); });
   command->add_option("BEFORE", arguments->before, "predicted cameras of the before epoch");
   command->add_option("AFTER", arguments->after, "predicted cameras of the after epoch");
   command->add_option("--change", arguments->change,
@@ -188,11 +211,13 @@ void add_evaluate(Program& program) {
   command->add_option("-o,--out,--output", arguments->out, "also write the numbers as JSON");
   command->footer(
       "Cameras are read from .npy ((N,4,4) or (N,3,4)), COLMAP models (folder) and TUM files.\n"
-      "Frames are matched in order. T1 is mapped into T2, one Umeyama Sim(3) over all camera "
-      "centres\n"
-      "maps both to the truth; ATE in the truth's unit. RTE and RRE compare neighbouring frames of "
-      "an\n"
-      "epoch, with that scale. Definitions: docs/benchmark.md.\n\n"
+      "Frames are matched by the photos' names (two COLMAP models), by time stamps (two TUM files, "
+      "to\n"
+      "0.01 s), otherwise in order: photo_2 before photo_10. T1 is mapped into T2, one Umeyama\n"
+      "Sim(3) over all camera centres maps both to the truth; ATE in the truth's unit. RTE and "
+      "RRE\n"
+      "compare neighbouring frames of an epoch, with that scale. Definitions: "
+      "docs/benchmark.md.\n\n"
       "  vggt-cd evaluate OUT/cameras_before.tum OUT/cameras_after.tum --truth truth.npz\n"
       "  vggt-cd evaluate --change OUT --truth truth.npz");
 }

@@ -87,6 +87,10 @@ void add_info(Program& program, CLI::App& parent) {
         const WeightFile file = open_weight_file(*path);
          print_answer("{:<13}{}\n", "file", escaped(*path));
          print_answer("{:<13}{}\n", "format", weight_format_name(file.format));
+         if (!file.removed_prefix.empty()) {
+           print_answer("{:<13}{} before every name, left out\n", "prefix",
+                        escaped(file.removed_prefix));
+         }
         print_precision(file);
         const CheckpointReport report = inspect_checkpoint(file, *path);
         print_network(report, file.metadata.contains("config"));

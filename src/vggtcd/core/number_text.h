@@ -20,4 +20,11 @@ std::optional<T> number_in(std::string_view text) {
   return value;
 }
 
+// The same for numbers that other programs wrote: a plus may stand before them (printf's %+f).
+inline std::optional<double> signed_number_in(std::string_view text) {
+  const bool plus = text.starts_with('+');
+  if (plus) text.remove_prefix(1);
+  return plus && text.starts_with('-') ? std::nullopt : number_in<double>(text);
+}
+
 }  // namespace vggtcd

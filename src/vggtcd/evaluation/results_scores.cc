@@ -11,6 +11,7 @@
 #include "vggtcd/core/number_text.h"
 #include "vggtcd/evaluation/synthetic/render.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/coordinate.h"
 #include "vggtcd/io/npz.h"
 
 namespace vggtcd {
@@ -27,6 +28,10 @@ std::vector<Rigid3> read_true_epoch(const NpzReader& reader, const std::string& 
   for (size_t k = 0; k < poses.size(); ++k) {
     const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(&values[12 * k]);
     poses[k] = {matrix.leftCols<3>(), matrix.col(3)};
+    if (!matrix.leftCols<3>().allFinite() || !are_coordinates(matrix.col(3))) {
+      throw_error(ErrorCode::kInput, "{}: {}: pose {}: expected a rotation and {}", reader.name(),
+                  key, k, kCoordinateRange);
+    }
   }
   return poses;
 }
@@ -81,6 +86,13 @@ Maps maps_of(const NpzReader& reader, const std::string& key) {
           static_cast<size_t>(shape[2])};
 }
 
+// Arrays that are looked up by the same pixel have one shape.
+void expect_maps(const NpzReader& reader, const std::string& key, const Maps& maps) {
+  const auto size = [](size_t value) { return static_cast<int64_t>(value); };
+  reader.expect_shape(
+      key, std::array<int64_t, 3>{size(maps.frames), size(maps.height), size(maps.width)});
+}
+
 // The pixel of a result frame that shows a pixel of the truth: both show the middle of the photo,
 // and the frame is filled. Negative outside.
 int64_t frame_pixel(const Maps& truth, const Maps& frame, size_t u, size_t v) {
@@ -107,11 +119,15 @@ struct Answers {
 // What the results say about the pixels of their own frames, whatever method made them.
 class Judgement {
  public:
-  Judgement(const NpzReader& change, const std::string& suffix)
-      : changed_(change.read<uint8_t>("changed" + suffix)) {
+  Judgement(const NpzReader& change, const std::string& suffix, const Maps& maps) {
+    expect_maps(change, "changed" + suffix, maps);
+    changed_ = change.read<uint8_t>("changed" + suffix);
     const bool voted = change.has("label" + suffix);
-    rank_ = change.read<float>((voted ? "evidence" : "score") + suffix);
+    const std::string rank = (voted ? "evidence" : "score") + suffix;
+    expect_maps(change, rank, maps);
+    rank_ = change.read<float>(rank);
     if (!voted) return;
+    expect_maps(change, "label" + suffix, maps);
     const auto label = change.read<uint8_t>("label" + suffix);
     for (size_t i = 0; i < label.size(); ++i) {
       if (label[i] == kNoLabel) {
@@ -136,7 +152,7 @@ Answers answer_pixels(const NpzReader& change, const std::string& suffix,
     throw_error(ErrorCode::kInput, "{}: expected {} frames as in colmap/, found {}", change.name(),
                 frames.poses.size(), maps.frames);
   }
-  const Judgement judgement(change, suffix);
+  const Judgement judgement(change, suffix, maps);
   const size_t pixels = truth.frames * truth.per_frame();
   Answers answers{std::vector<float>(pixels, kNoEvidence), std::vector<uint8_t>(pixels, 0)};
   for (size_t k = 0; k < maps.frames; ++k) {
@@ -172,6 +188,7 @@ struct Counts {
 void count(const NpzReader& truth, const std::string& suffix, const Answers& answers,
            const Maps& maps, Counts& counts) {
   counts.found_in_frame.assign(maps.frames, 0);
+  expect_maps(truth, "unseen_by_other" + suffix, maps);
   const auto label = truth.read<uint8_t>("changed" + suffix);
   const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
   for (size_t pixel = 0; pixel < label.size(); ++pixel) {
@@ -212,6 +229,7 @@ ResultsScores score_results(const std::filesystem::path& results,
     const std::string suffix = kSuffix[e];
     const std::vector<Rigid3>& true_poses = e == 0 ? true_cameras.t1 : true_cameras.t2;
     const Maps maps = maps_of(truth, "changed" + suffix);
+    expect_maps(truth, "changed" + suffix, {true_poses.size(), maps.height, maps.width});
     const ResultFrames frames =
         frames_of(cameras, kFolder[e], static_cast<int>(true_poses.size()), results);
     (e == 0 ? found.t1 : found.t2) = frames.poses;

@@ -57,7 +57,7 @@ std::vector<Rigid3> poses_of_sequence(const std::map<std::string, Rigid3>& regis
 
 std::map<std::string, Rigid3> registered_poses(const fs::path& scene_directory) {
   std::map<std::string, Rigid3> registered;
-  for (const NamedPose& pose : colmap_trajectory(read_colmap(scene_directory / "sparse" / "0"))) {
+  for (const NamedPose& pose : read_colmap_trajectory(scene_directory / "sparse" / "0")) {
     registered[pose.name] = pose.camera_from_world;
   }
   return registered;

@@ -44,20 +44,29 @@ struct ColmapModel {
 };
 
 // Reads DIR/cameras.bin, images.bin and points3D.bin, or the .txt files if there is no images.bin.
-// Missing points are no error. Throws Error{kInput}.
+// Missing points are no error. Coordinates are bounded (coordinate.h). Throws Error{kInput}.
 ColmapModel read_colmap(const std::filesystem::path& directory);
 
-// The views of a model without distortion (PINHOLE, SIMPLE_PINHOLE) in the order of their names.
-// Throws Error{kInput} naming the first camera of another kind.
+// The views of a model without distortion (PINHOLE, SIMPLE_PINHOLE) in natural order of
+// their names. Throws Error{kInput} naming the first camera of another kind.
 std::vector<View> colmap_views(const ColmapModel& model);
-// The poses alone, whatever the camera model, in the order of their names.
+// The poses alone, whatever the camera model, in natural order of their names: photo_2 before
+// photo_10, as photos are read (natural_less).
 Trajectory colmap_trajectory(const ColmapModel& model);
+// The same of a directory; only images.bin or images.txt is read, so that the cameras may be of any
+// model, also of one that is newer than this program.
+Trajectory read_colmap_trajectory(const std::filesystem::path& directory);
 
 struct ColoredPoint {
   Eigen::Vector3d position;
   std::array<uint8_t, 3> rgb;
 };
 
+// Writes the model into an existing directory, as text; and as binary as well if a name has a
+// space: COLMAP reads a name in images.txt up to the first space, and takes the binary files where
+// there are both. Throws Error{kOutput}.
+void write_colmap(const std::filesystem::path& directory, std::span<const View> views,
+                  std::span<const ColoredPoint> points = {});
 // Writes the three text files into an existing directory: a PINHOLE camera and an image per view,
 // and points without tracks. Names must be distinct. Throws Error{kOutput}.
 void write_colmap_text(const std::filesystem::path& directory, std::span<const View> views,

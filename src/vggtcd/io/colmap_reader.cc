@@ -8,9 +8,12 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/colmap.h"
+#include "vggtcd/io/coordinate.h"
 #include "vggtcd/io/failure.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/input_file.h"
+#include "vggtcd/io/photo_source.h"
+#include "vggtcd/io/text_file.h"
 #include "vggtcd/io/text_line.h"
 
 namespace vggtcd {
@@ -20,7 +23,7 @@ struct CameraModel {
   const char* name;
   size_t num_params;
 };
-// In the order of COLMAP's model ids.
+// In the order of COLMAP's model ids (src/colmap/sensor/models.h of COLMAP 4).
 constexpr CameraModel kModels[] = {{"SIMPLE_PINHOLE", 3},
                                    {"PINHOLE", 4},
                                    {"SIMPLE_RADIAL", 4},
@@ -31,7 +34,13 @@ constexpr CameraModel kModels[] = {{"SIMPLE_PINHOLE", 3},
                                    {"FOV", 5},
                                    {"SIMPLE_RADIAL_FISHEYE", 4},
                                    {"RADIAL_FISHEYE", 5},
-                                   {"THIN_PRISM_FISHEYE", 12}};
+                                   {"THIN_PRISM_FISHEYE", 12},
+                                   {"RAD_TAN_THIN_PRISM_FISHEYE", 16},
+                                   {"SIMPLE_DIVISION", 4},
+                                   {"DIVISION", 5},
+                                   {"SIMPLE_FISHEYE", 3},
+                                   {"FISHEYE", 4},
+                                   {"EUCM", 6}};
 
 // A binary file in memory, read field by field.
 class BinaryReader {
@@ -49,6 +58,11 @@ class BinaryReader {
   double get_finite() {
     const double value = get<double>();
     if (!std::isfinite(value)) fail("finite numbers", "NaN or infinity");
+    return value;
+  }
+  double get_coordinate() {
+    const double value = get<double>();
+    if (!is_coordinate(value)) fail(kCoordinateRange, fmt::format("{:g}", value));
     return value;
   }
   // A number of things that take at least this many bytes each: a lie is found before memory is
@@ -97,7 +111,9 @@ void read_binary_cameras(const std::filesystem::path& path, ColmapModel& model) 
     const auto id = file.get<uint32_t>();
     const auto model_id = file.get<int32_t>();
     if (model_id < 0 || model_id >= static_cast<int32_t>(std::size(kModels))) {
-      file.fail("a camera model from 0 to 10", std::to_string(model_id));
+      // How many parameters follow is not known, so nothing behind it can be found.
+      file.fail(fmt::format("camera models from 0 to {}", std::size(kModels) - 1),
+                fmt::format("{}; convert the model to text (colmap model_converter)", model_id));
     }
     ColmapCamera camera;
     camera.model = kModels[model_id].name;
@@ -119,7 +135,7 @@ void read_binary_images(const std::filesystem::path& path, ColmapModel& model) {
     for (double& value : q) value = file.get_finite();
     image.camera_from_world.rotation =
         checked(Eigen::Quaterniond(q[0], q[1], q[2], q[3]), file).toRotationMatrix();
-    for (double& value : image.camera_from_world.translation) value = file.get_finite();
+    for (double& value : image.camera_from_world.translation) value = file.get_coordinate();
     image.camera_id = file.get<uint32_t>();
     image.name = file.get_text();
     const auto points2d = file.get<uint64_t>();
@@ -135,7 +151,7 @@ void read_binary_points(const std::filesystem::path& path, ColmapModel& model) {
   for (uint64_t left = count; left > 0; --left) {
     ColmapPoint point;
     file.get<uint64_t>();  // id
-    for (double& value : point.position) value = file.get_finite();
+    for (double& value : point.position) value = file.get_coordinate();
     for (uint8_t& channel : point.rgb) channel = file.get<uint8_t>();
     point.error_px = file.get<double>();
     for (uint64_t track = file.get_count(8); track > 0; --track) {
@@ -149,19 +165,17 @@ void read_binary_points(const std::filesystem::path& path, ColmapModel& model) {
 // Calls use(line) for each line of data; with `pairs`, each is followed by a line that is skipped.
 template <typename Use>
 void for_each_line(const std::filesystem::path& path, bool pairs, const Use& use) {
-  InputFile file(path, "a file of a COLMAP model");
-  std::string text;
   bool skip = false;
-  for (int number = 1; std::getline(file, text); ++number) {
+  for_each_text_line(path, "a file of a COLMAP model", [&](int number, std::string_view text) {
     if (skip) {
       skip = false;
-      continue;
+      return;
     }
     const TextLine line(path, number, text);
-    if (line.is_blank_or_comment()) continue;
+    if (line.is_blank_or_comment()) return;
     use(line);
     skip = pairs;
-  }
+  });
 }
 
 uint32_t get_id(const TextLine& line, size_t i) {
@@ -170,14 +184,23 @@ uint32_t get_id(const TextLine& line, size_t i) {
   return static_cast<uint32_t>(id);
 }
 
+void expect_model_name(const TextLine& line, const std::string& name) {
+  const bool good = std::ranges::all_of(
+      name, [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_'; });
+  if (!good) line.fail("the name of a COLMAP camera model (PINHOLE, ...)", name);
+}
+
 void read_text_cameras(const std::filesystem::path& path, ColmapModel& model) {
   for_each_line(path, false, [&](const TextLine& line) {
     ColmapCamera camera{std::string(line.word(1)), line.integer(2), line.integer(3), {}};
     const auto* known = std::find_if(std::begin(kModels), std::end(kModels),
                                      [&](const CameraModel& m) { return camera.model == m.name; });
-    if (known == std::end(kModels)) line.fail("a COLMAP camera model", camera.model);
-    line.expect_count(4 + known->num_params,
-                      fmt::format("{} parameters of {}", known->num_params, camera.model));
+    // A model that is newer than this list may have any number of parameters.
+    if (known == std::end(kModels)) expect_model_name(line, camera.model);
+    if (known != std::end(kModels)) {
+      line.expect_count(4 + known->num_params,
+                        fmt::format("{} parameters of {}", known->num_params, camera.model));
+    }
     for (size_t i = 4; i < line.size(); ++i) camera.params.push_back(line.number(i));
     model.cameras[get_id(line, 0)] = camera;
   });
@@ -187,7 +210,8 @@ void read_text_images(const std::filesystem::path& path, ColmapModel& model) {
   for_each_line(path, true, [&](const TextLine& line) {
     ColmapImage image;
     image.camera_from_world.rotation = line.unit_quaternion({2, 3, 4, 1}).toRotationMatrix();
-    image.camera_from_world.translation = {line.number(5), line.number(6), line.number(7)};
+    image.camera_from_world.translation = {line.coordinate(5), line.coordinate(6),
+                                           line.coordinate(7)};
     image.camera_id = get_id(line, 8);
     image.name = std::string(line.rest(9));
     model.images[get_id(line, 0)] = image;
@@ -197,7 +221,7 @@ void read_text_images(const std::filesystem::path& path, ColmapModel& model) {
 void read_text_points(const std::filesystem::path& path, ColmapModel& model) {
   for_each_line(path, false, [&](const TextLine& line) {
     ColmapPoint point;
-    point.position = {line.number(1), line.number(2), line.number(3)};
+    point.position = {line.coordinate(1), line.coordinate(2), line.coordinate(3)};
     for (size_t i = 0; i < 3; ++i) {
       const int64_t level = line.integer(4 + i);
       if (level < 0 || level > 255) line.fail("a colour from 0 to 255", line.word(4 + i));
@@ -213,27 +237,32 @@ std::vector<const ColmapImage*> sorted_images(const ColmapModel& model) {
   std::vector<const ColmapImage*> images;
   for (const auto& [id, image] : model.images) images.push_back(&image);
   std::stable_sort(images.begin(), images.end(),
-                   [](const auto* a, const auto* b) { return a->name < b->name; });
+                   [](const auto* a, const auto* b) { return natural_less(a->name, b->name); });
   return images;
+}
+
+// Whether the model is binary.
+bool find_form(const std::filesystem::path& directory) {
+  if (exists_at(directory / "images.bin")) return true;
+  if (exists_at(directory / "images.txt")) return false;
+  throw_error(ErrorCode::kInput,
+              "{}: expected a COLMAP model (images.bin or images.txt), found neither",
+              directory.string());
+}
+
+void read_images(const std::filesystem::path& directory, bool binary, ColmapModel& model) {
+  binary ? read_binary_images(directory / "images.bin", model)
+         : read_text_images(directory / "images.txt", model);
 }
 
 }  // namespace
 
 ColmapModel read_colmap(const std::filesystem::path& directory) try {
   ColmapModel model;
-  const bool binary = exists_at(directory / "images.bin");
-  if (!binary && !exists_at(directory / "images.txt")) {
-    throw_error(ErrorCode::kInput,
-                "{}: expected a COLMAP model (images.bin or images.txt), found neither",
-                directory.string());
-  }
-  if (binary) {
-    read_binary_cameras(directory / "cameras.bin", model);
-    read_binary_images(directory / "images.bin", model);
-  } else {
-    read_text_cameras(directory / "cameras.txt", model);
-    read_text_images(directory / "images.txt", model);
-  }
+  const bool binary = find_form(directory);
+  binary ? read_binary_cameras(directory / "cameras.bin", model)
+         : read_text_cameras(directory / "cameras.txt", model);
+  read_images(directory, binary, model);
   const std::filesystem::path points = directory / (binary ? "points3D.bin" : "points3D.txt");
   if (exists_at(points)) {
     binary ? read_binary_points(points, model) : read_text_points(points, model);
@@ -285,6 +314,12 @@ Trajectory colmap_trajectory(const ColmapModel& model) {
     trajectory.push_back({image->name, image->camera_from_world});
   }
   return trajectory;
+}
+
+Trajectory read_colmap_trajectory(const std::filesystem::path& directory) {
+  ColmapModel model;
+  read_images(directory, find_form(directory), model);
+  return colmap_trajectory(model);
 }
 
 }  // namespace vggtcd

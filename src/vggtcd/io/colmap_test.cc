@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "tests/support/test_files.h"
 
@@ -118,10 +119,15 @@ TEST(ReadColmap, RefusesBrokenTextByLine) {
   };
   expect("cameras.txt", "1 PINHOLE 640 480 500 510 320\n",
          "cameras.txt:1: expected 4 parameters of PINHOLE, found 7 words");
-  expect("cameras.txt", "# c\n1 FISHY 640 480 500\n", "cameras.txt:2: expected a COLMAP camera");
+  expect("cameras.txt", "# c\n1 pin-hole 640 480 500\n",
+         "cameras.txt:2: expected the name of a COLMAP camera model");
   expect("cameras.txt", "", "expected a camera 1 for image 3, found none");
   expect("images.txt", "1 1 0 0 0 0 0 0 1\n", "images.txt:1: expected at least 10 words");
   expect("images.txt", "1 1 0 0 0 0 nan 0 1 a.jpg\n", "images.txt:1: expected a number, found nan");
+  expect("images.txt", "1 1 0 0 0 0 1.7e308 0 1 a.jpg\n",
+         "images.txt:1: expected coordinates from -1e13 to 1e13, found 1.7e308");
+  expect("images.txt", "1 1 0 0 0 0 0,5 0 1 a.jpg\n",
+         "images.txt:1: expected a number with a decimal point, found 0,5");
   expect("images.txt", "1 3 0 0 0 0 0 0 1 a.jpg\n", "expected a unit quaternion, found norm 3");
   expect("images.txt", "-1 1 0 0 0 0 0 0 1 a.jpg\n", "expected an id");
   expect("points3D.txt", "1 0 0 0 0 0 256 0\n", "expected a colour from 0 to 255, found 256");
@@ -141,8 +147,114 @@ TEST(ReadColmap, RefusesTruncationAnywhereInBinary) {
   }
 }
 
+// A binary model of one image "before/a.jpg" whose camera has this model and number of parameters.
+void write_camera_model(const TemporaryDirectory& directory, int32_t model_id, size_t num_params) {
+  const auto bytes_of = [](auto value) {
+    return std::string(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  std::string cameras = bytes_of(uint64_t{1}) + bytes_of(uint32_t{5}) + bytes_of(model_id) +
+                        bytes_of(uint64_t{640}) + bytes_of(uint64_t{480});
+  for (size_t i = 0; i < num_params; ++i) cameras += bytes_of(100.0 + static_cast<double>(i));
+  std::string images = bytes_of(uint64_t{1}) + bytes_of(uint32_t{9});
+  for (const double value : {1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0}) images += bytes_of(value);
+  images += bytes_of(uint32_t{5}) + std::string("before/a.jpg") + '\0' + bytes_of(uint64_t{0});
+  write_bytes(directory / "cameras.bin", cameras);
+  write_bytes(directory / "images.bin", images);
+}
+
+TEST(ReadColmap, KnowsTheCameraModelsOfNewerVersions) {
+  const struct {
+    int32_t id;
+    size_t params;
+    const char* name;
+  } models[] = {{10, 12, "THIN_PRISM_FISHEYE"},
+                {11, 16, "RAD_TAN_THIN_PRISM_FISHEYE"},
+                {12, 4, "SIMPLE_DIVISION"},
+                {13, 5, "DIVISION"},
+                {14, 3, "SIMPLE_FISHEYE"},
+                {15, 4, "FISHEYE"},
+                {16, 6, "EUCM"}};
+  for (const auto& model : models) {
+    const TemporaryDirectory directory;
+    write_camera_model(directory, model.id, model.params);
+    const ColmapModel read = read_colmap(directory.path());
+    EXPECT_EQ(read.cameras.at(5).model, model.name);
+    EXPECT_EQ(read.cameras.at(5).params.size(), model.params);
+    EXPECT_INPUT_ERROR(colmap_views(read), "run colmap image_undistorter");
+  }
+}
+
+TEST(ReadColmap, PosesNeedNoKnownCameraModel) {
+  const TemporaryDirectory directory;
+  write_camera_model(directory, 99, 7);
+  const Trajectory trajectory = read_colmap_trajectory(directory.path());
+  ASSERT_EQ(trajectory.size(), 1u);
+  EXPECT_EQ(trajectory[0].name, "before/a.jpg");
+  EXPECT_EQ(trajectory[0].camera_from_world.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_INPUT_ERROR(read_colmap(directory.path()),
+                     "cameras.bin: expected camera models from 0 to 16, found 99; convert");
+  // In text every camera has a line of its own.
+  const TemporaryDirectory text;
+  write_bytes(text / "cameras.txt", "1 NEW_MODEL 640 480 1 2 3 4 5 6 7\n");
+  write_bytes(text / "images.txt", "1 1 0 0 0 0 0 0 1 a.jpg\n\n");
+  EXPECT_EQ(read_colmap(text.path()).cameras.at(1).params.size(), 7u);
+}
+
+TEST(ReadColmap, ImagesComeInNaturalOrderOfTheirNames) {
+  const TemporaryDirectory directory;
+  std::string images;
+  for (const int number : {1, 10, 11, 2, 9}) {
+    images += fmt::format("{} 1 0 0 0 0 0 0 1 after/frame_{}.jpg\n\n", 100 - number, number);
+  }
+  write_bytes(directory / "images.txt", images);
+  std::vector<std::string> names;
+  for (const NamedPose& pose : read_colmap_trajectory(directory.path())) names.push_back(pose.name);
+  EXPECT_THAT(names, ElementsAre("after/frame_1.jpg", "after/frame_2.jpg", "after/frame_9.jpg",
+                                 "after/frame_10.jpg", "after/frame_11.jpg"));
+}
+
+TEST(ReadColmap, ByteOrderMarksPlusSignsAndCarriageReturnsAreNoErrors) {
+  const TemporaryDirectory directory;
+  write_bytes(directory / "images.txt",
+              "\xef\xbb\xbf# x\r\n1 +1 0 0 0 +0.5 -2 0 1 a b.jpg\r\n\r\n");
+  const Trajectory trajectory = read_colmap_trajectory(directory.path());
+  ASSERT_EQ(trajectory.size(), 1u);
+  EXPECT_EQ(trajectory[0].name, "a b.jpg");
+  EXPECT_EQ(trajectory[0].camera_from_world.translation, Eigen::Vector3d(0.5, -2, 0));
+}
+
+TEST(ReadColmap, RefusesBinaryCoordinatesThatMeanNothing) {
+  const TemporaryDirectory directory;
+  for (const double value : {1e308, -1e14, static_cast<double>(NAN)}) {
+    write_camera_model(directory, 1, 4);
+    std::string images = file_bytes(directory / "images.bin");
+    images.replace(8 + 4 + 4 * 8, 8, std::string(reinterpret_cast<const char*>(&value), 8));
+    write_bytes(directory / "images.bin", images);
+    EXPECT_INPUT_ERROR(read_colmap(directory.path()),
+                       "images.bin: expected coordinates from -1e13 to 1e13, found");
+  }
+}
+
+// COLMAP's own reader takes a name in images.txt up to the first space, and prefers binary files.
+TEST(WriteColmap, AddsTheBinaryFormWhereANameHasASpace) {
+  std::vector<View> views = two_views();
+  const TemporaryDirectory with_space;
+  write_colmap(with_space.path(), views);
+  EXPECT_EQ(with_space.num_files(), 6u);
+  EXPECT_EQ(read_colmap(with_space.path()).images.at(2).name, "before/one two.jpg");
+  views[1].name = "before/one_two.jpg";
+  const TemporaryDirectory without;
+  write_colmap(without.path(), views);
+  EXPECT_EQ(without.num_files(), 3u);
+}
+
 TEST(ReadColmap, SaysWhatIsMissing) {
   const TemporaryDirectory directory;
+  std::filesystem::create_directory(directory / "images.bin");
+  EXPECT_INPUT_ERROR(read_colmap_trajectory(directory.path()),
+                     "images.bin: expected a readable file, found a directory");
+  EXPECT_INPUT_ERROR(read_colmap(directory.path()), "cameras.bin: expected a readable file");
+  std::filesystem::remove(directory / "images.bin");
   EXPECT_INPUT_ERROR(read_colmap(directory.path()), "expected a COLMAP model (images.bin or");
 }
 

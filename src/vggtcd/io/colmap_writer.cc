@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writing COLMAP models.
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstring>
 #include <set>
 
@@ -49,6 +50,15 @@ class BinaryFile {
 };
 
 }  // namespace
+
+void write_colmap(const std::filesystem::path& directory, std::span<const View> views,
+                  std::span<const ColoredPoint> points) {
+  write_colmap_text(directory, views, points);
+  const bool spaces = std::ranges::any_of(views, [](const View& view) {
+    return view.name.find_first_of(" \t\v\f") != std::string::npos;
+  });
+  if (spaces) write_colmap_binary(directory, views, points);
+}
 
 void write_colmap_text(const std::filesystem::path& directory, std::span<const View> views,
                        std::span<const ColoredPoint> points) {

@@ -2,6 +2,7 @@
 // JSON files and options structs as JSON.
 #include "vggtcd/io/json_file.h"
 
+#include <cmath>
 #include <limits>
 
 #include "vggtcd/io/failure.h"
@@ -99,6 +100,7 @@ bool json_to(const Json& json, double& value) {
 bool json_to(const Json& json, float& value) {
   double number = 0;
   if (!json_to(json, number)) return false;
+  if (std::abs(number) > static_cast<double>(std::numeric_limits<float>::max())) return false;
   value = static_cast<float>(number);
   return true;
 }

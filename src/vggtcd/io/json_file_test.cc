@@ -103,8 +103,12 @@ TEST(JsonFile, RefusesBrokenDeepAndMissingFiles) {
   };
   expect("", "expected JSON, found something else");
   expect("{\"a\": 1,}", "found something else at byte 9");
+  expect(R"({"scale": 1e999})", "a.json: expected JSON, found a number that no double can hold");
+  expect("[-1e400, 0]", "a number that no double can hold");
   expect(std::string(1000000, '['), "expected JSON nested at most 100 deep");
-  EXPECT_INPUT_ERROR(read_json_file(directory / "none.json"), "expected a readable JSON file");
+  EXPECT_INPUT_ERROR(read_json_file(directory / "none.json"),
+                     "none.json: expected a readable file");
+  EXPECT_INPUT_ERROR(read_json_file(directory.path()), "found a directory");
   // Brackets in text do not count.
   write_bytes(directory / "a.json", "\"\\\"" + std::string(200, '[') + "\"");
   EXPECT_EQ(read_json_file(directory / "a.json").get<std::string>().size(), 201u);

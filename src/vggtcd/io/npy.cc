@@ -164,9 +164,12 @@ bool is_exactly(const NpyHeader& header) {
 }
 
 void append_utf8(std::string& text, uint32_t code, std::string_view what) {
-  if (code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) {
+  if (code > 0x10ffff) {
     throw_error(ErrorCode::kInput, "{}: expected Unicode text, found code point {:#x}", what, code);
   }
+  // Python keeps bytes of names that are not UTF-8 as single surrogates, which no UTF-8 can hold.
+  constexpr uint32_t kReplacement = 0xfffd;
+  if (code >= 0xd800 && code < 0xe000) code = kReplacement;
   const auto tail = [&](unsigned shift) {
     text += static_cast<char>(0x80 | ((code >> shift) & 0x3f));
   };

@@ -74,6 +74,11 @@ TEST(NpyHeader, RefusesWhatNumpyDoesNotWriteInOneLineNamingTheArray) {
       "{'descr': '<f4', 'fortran_order': False, 'shape': (99999999999999999999,)}",
       "{'descr': '<f8', 'fortran_order': False, 'shape': (4294967296, 4294967296)}",
       "{'descr': '<f8', 'fortran_order': False, 'shape': (0, 4294967296, 4294967296)}",
+      // The size in bytes is 2^64 and a little more: what is there would seem to be enough.
+      "{'descr': '<f8', 'fortran_order': False, 'shape': (2305843009213693952,)}",
+      "{'descr': '<f8', 'fortran_order': False, 'shape': (144115188075855873, 4, 4)}",
+      "{'descr': '<i8', 'fortran_order': False, 'shape': (2305843009213693955,)}",
+      "{'descr': '<U536870912', 'fortran_order': False, 'shape': (8589934592,)}",
       "{'descr': [('a', '<f4', 'fortran_order': False, 'shape': (3, 4)}",
       "{'descr': '<f4', 'fortran_order': False, 'shape': (3, 4)} trailing",
   };
@@ -105,7 +110,8 @@ TEST(NpyFile, ReadsWhatItWrites) {
 TEST(NpyFile, RefusesTruncatedAndMissingFiles) {
   const TemporaryDirectory directory;
   EXPECT_INPUT_ERROR(read_npy_file(directory / "none.npy"), "none.npy");
-  EXPECT_INPUT_ERROR(read_npy_file(directory.path()), "expected a readable .npy file");
+  EXPECT_INPUT_ERROR(read_npy_file(directory.path()),
+                     "expected a readable file, found a directory");
   std::filesystem::copy_file(source_file("tests/golden/npz/f32_2x3.npy"), directory / "short.npy");
   std::filesystem::resize_file(directory / "short.npy", 128 + 23);
   EXPECT_INPUT_ERROR(read_npy_file(directory / "short.npy"), "expected 24 bytes of data, found 23");

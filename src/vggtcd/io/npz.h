@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -30,8 +31,8 @@ class NpzReader {
 
   const std::string& name() const { return name_; }
 
-  // The keys of the arrays that can be read, in file order. Object arrays (pickles) and members
-  // that are not .npy are left out.
+  // The keys of the arrays that can be read, in file order. Object arrays (pickles), members that
+  // are not .npy and what macOS adds when it packs a folder (__MACOSX/, ._NAME) are left out.
   const std::vector<std::string>& keys() const { return keys_; }
   bool has(std::string_view key) const { return find(key) != nullptr; }
   const NpyHeader& header(std::string_view key) const;
@@ -39,6 +40,7 @@ class NpzReader {
   // The array in C order; conversions as read_npy_slabs says.
   template <typename T>
   std::vector<T> read(std::string_view key) const {
+    expect_numbers(key);
     std::vector<T> values(static_cast<size_t>(header(key).numel()));
     read_into<T>(key, values);
     return values;
@@ -50,6 +52,9 @@ class NpzReader {
   void read_slabs(std::string_view key, const NpySlabs<T>& sink) const;
   std::vector<std::string> read_strings(std::string_view key) const;
 
+  // Throws unless its elements are numbers or bool: only then the size in bytes of an array of this
+  // shape was compared with what is in the file.
+  void expect_numbers(std::string_view key) const;
   // Throws unless the array is there and has this shape; -1 matches any size.
   void expect_shape(std::string_view key, std::span<const int64_t> shape) const;
 
@@ -65,6 +70,7 @@ class NpzReader {
   std::string name_;
   std::unique_ptr<Zip> zip_;
   std::vector<Entry> entries_;
+  std::map<std::string, size_t, std::less<>> entry_of_key_;
   std::vector<std::string> keys_;
 };
 

@@ -54,6 +54,12 @@ std::string start_of_file(const std::filesystem::path& path) {
   return start;
 }
 
+// The side files with which macOS keeps attributes: no arrays, whatever their names end in.
+bool is_of_macos(std::string_view member) {
+  const std::string_view file = member.substr(member.find_last_of('/') + 1);
+  return member.starts_with("__MACOSX/") || file.starts_with("._");
+}
+
 [[noreturn]] void throw_not_npz(std::string_view name, std::string_view found) {
   throw_error(ErrorCode::kInput, "{}: expected {}, found {}", name, kExpected, found);
 }
@@ -174,7 +180,7 @@ void NpzReader::index() {
       throw_not_npz(name_, "a damaged zip directory; copy or download it again");
     }
     const std::string_view member = stat.name;
-    if (!member.ends_with(".npy")) continue;
+    if (!member.ends_with(".npy") || is_of_macos(member)) continue;
     Entry entry{std::string(member.substr(0, member.size() - 4)), i, {}};
     const std::string what = name_ + ": " + entry.key;
     // Keys go into messages of one line.
@@ -200,7 +206,9 @@ void NpzReader::index() {
       throw_error(ErrorCode::kInput, "{}: expected {} bytes of data for shape {}, found {}", what,
                   entry.header.data_bytes(), shape_string(entry.header.shape), found);
     }
-    if (has(entry.key)) throw_error(ErrorCode::kInput, "{}: is in the file twice", what);
+    if (!entry_of_key_.emplace(entry.key, entries_.size()).second) {
+      throw_error(ErrorCode::kInput, "{}: is in the file twice", what);
+    }
     keys_.push_back(entry.key);
     entries_.push_back(std::move(entry));
   }
@@ -208,10 +216,8 @@ void NpzReader::index() {
 }
 
 const NpzReader::Entry* NpzReader::find(std::string_view key) const {
-  for (const Entry& entry : entries_) {
-    if (entry.key == key) return &entry;
-  }
-  return nullptr;
+  const auto found = entry_of_key_.find(key);
+  return found == entry_of_key_.end() ? nullptr : &entries_[found->second];
 }
 
 const NpzReader::Entry& NpzReader::at(std::string_view key) const {
@@ -247,6 +253,7 @@ void NpzReader::read_into(std::string_view key, std::span<T> target) const {
 
 template <typename T>
 void NpzReader::read_slabs(std::string_view key, const NpySlabs<T>& sink) const {
+  expect_numbers(key);
   with_data(key, [&](const NpyHeader& header, const ReadBytes& read, std::string_view what) {
     read_npy_slabs<T>(header, read, what, sink);
   });
@@ -267,6 +274,16 @@ std::vector<std::string> NpzReader::read_strings(std::string_view key) const {
     strings = read_npy_strings(header, read, what);
   });
   return strings;
+}
+
+void NpzReader::expect_numbers(std::string_view key) const {
+  const NpyHeader& found = header(key);
+  if (found.kind == NpyKind::kBool || found.kind == NpyKind::kInt ||
+      found.kind == NpyKind::kUnsigned || found.kind == NpyKind::kFloat) {
+    return;
+  }
+  throw_error(ErrorCode::kInput, "{}: {}: expected numbers, found type {}", name_, key,
+              found.descr);
 }
 
 void NpzReader::expect_shape(std::string_view key, std::span<const int64_t> shape) const {

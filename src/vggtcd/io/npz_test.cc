@@ -6,19 +6,20 @@
 #include <cstdlib>
 
 #include "tests/support/test_files.h"
+#include "tests/support/torch_writer.h"
 
 namespace vggtcd {
 namespace {
 
-using testing::Contains;
-using testing::ElementsAre;
-using testing::Not;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::Not;
 
 // The formulas of tests/golden/npz/make.py.
-class NpzGolden : public testing::TestWithParam<const char*> {};
+class NpzGolden : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Files, NpzGolden,
-                         testing::Values("tests/golden/npz/types_stored.npz",
-                                         "tests/golden/npz/types_deflated_zip64.npz"));
+                         ::testing::Values("tests/golden/npz/types_stored.npz",
+                                           "tests/golden/npz/types_deflated_zip64.npz"));
 
 TEST_P(NpzGolden, EveryNumberTypeReadsAsNumpySavedIt) {
   const NpzReader npz(source_file(GetParam()));
@@ -189,6 +190,47 @@ TEST(NpzReader, NamesAndTypesCannotBreakTheLineOfAMessage) {
     const auto read = [&] { NpzReader(std::as_bytes(std::span(bytes)), "a.npz").read<float>(key); };
     EXPECT_INPUT_ERROR(read(), "a.npz: ");
   }
+}
+
+TEST(NpzReader, AnArrayOfNoNumbersIsRefusedBeforeMemoryIsReserved) {
+  const TemporaryDirectory directory;
+  const std::vector<int64_t> huge{int64_t{1} << 60};
+  for (const char* descr : {"<c16", "<U0", "<M8[ns]"}) {
+    const std::string npy = npy_header(descr, huge);
+    const std::pair<std::string, std::string> member{"a.npy", npy};
+    write_bytes(directory / "a.npz", vggtcd::testing::stored_zip({&member, 1}));
+    const NpzReader npz(directory / "a.npz");
+    EXPECT_INPUT_ERROR(npz.read<double>("a"), "a.npz: a: expected numbers, found type");
+    EXPECT_INPUT_ERROR(npz.read_slabs<double>("a", [](int64_t, std::span<const double>) {}),
+                       "a.npz: a: expected numbers, found type");
+  }
+}
+
+TEST(NpzReader, WhatMacosAddsIsNoArray) {
+  const TemporaryDirectory directory;
+  const std::vector<int64_t> one{1};
+  const std::string side = std::string("\0\5\x16\7\0\2\0\0", 8) + "Mac OS X        ";
+  const std::vector<std::pair<std::string, std::string>> members = {
+      {"x.npy", npy_header("|u1", one) + "\7"},
+      {"__MACOSX/._x.npy", side},
+      {"._x.npy", side},
+      {"part/._y.npy", side}};
+  write_bytes(directory / "a.npz", vggtcd::testing::stored_zip(members));
+  const NpzReader npz(directory / "a.npz");
+  EXPECT_THAT(npz.keys(), ElementsAre("x"));
+  EXPECT_THAT(npz.read<uint8_t>("x"), ElementsAre(7));
+}
+
+TEST(NpzReader, SingleSurrogatesOfPythonBecomeReplacementCharacters) {
+  const TemporaryDirectory directory;
+  const std::vector<int64_t> one{1};
+  std::string npy = npy_header("<U3", one);
+  for (const uint32_t code : {0x4bu, 0xdcfcu, 0x63u}) {
+    npy.append(reinterpret_cast<const char*>(&code), sizeof(code));
+  }
+  const std::pair<std::string, std::string> member{"names.npy", npy};
+  write_bytes(directory / "a.npz", vggtcd::testing::stored_zip({&member, 1}));
+  EXPECT_THAT(NpzReader(directory / "a.npz").read_strings("names"), ElementsAre("K\ufffdc"));
 }
 
 TEST(NpzWriter, ReaderGetsBackWhatWasAdded) {

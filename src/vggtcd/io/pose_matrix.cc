@@ -6,6 +6,7 @@
 #include <Eigen/SVD>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/coordinate.h"
 
 namespace vggtcd::internal {
 
@@ -25,6 +26,10 @@ Rigid3 pose_from_matrix(std::span<const double> values, const std::string& where
   check(values.size() == 12 || values.size() == 16, "pose_from_matrix: 3 x 4 or 4 x 4");
   const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> top(values.data());
   if (!top.allFinite()) throw_error(ErrorCode::kInput, "{}: expected finite numbers", where);
+  if (!are_coordinates(top.col(3))) {
+    throw_error(ErrorCode::kInput, "{}: expected {}, found {:g} {:g} {:g}", where, kCoordinateRange,
+                top(0, 3), top(1, 3), top(2, 3));
+  }
   if (values.size() == 16) {
     const Eigen::Map<const Eigen::RowVector4d> last(values.data() + 12);
     if (!last.isApprox(Eigen::RowVector4d(0, 0, 0, 1), 1e-3)) {

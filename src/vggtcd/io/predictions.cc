@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
@@ -54,6 +55,14 @@ std::string images_key(const NpzReader& npz) {
   return "";
 }
 
+// An archive may have any number of arrays, a message is one line that somebody reads.
+std::string some_of(const std::vector<std::string>& keys) {
+  constexpr size_t kShown = 20;
+  const size_t shown = std::min(keys.size(), kShown);
+  return fmt::format("{}{}", fmt::join(std::span(keys).first(shown), ", "),
+                     shown < keys.size() ? fmt::format(" and {} more", keys.size() - shown) : "");
+}
+
 PredictionLayout find_layout(const NpzReader& npz) {
   PredictionLayout layout;
   if (npz.has("extrinsic")) {
@@ -66,7 +75,7 @@ PredictionLayout find_layout(const NpzReader& npz) {
     throw_error(ErrorCode::kInput,
                 "{}: expected predictions with an array extrinsic (VGGT, MapAnything) or "
                 "extrinsics (Depth Anything 3), found {}",
-                npz.name(), fmt::join(npz.keys(), ", "));
+                npz.name(), some_of(npz.keys()));
   }
   for (const std::string& key : {layout.poses, layout.intrinsics, std::string("depth")}) {
     expect_float(npz, key);
@@ -98,11 +107,14 @@ void expect_map(const NpzReader& npz, const std::string& key, const PredictionLa
   npz.expect_shape(key, shape);
 }
 
+bool all_finite(std::span<const double> values) {
+  return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });
+}
+
 Pinhole read_pinhole(const double* k, const PredictionLayout& layout, const std::string& where) {
-  const bool finite = std::all_of(k, k + 9, [](double value) { return std::isfinite(value); });
   const bool form = std::abs(k[1]) <= 1e-3 * std::abs(k[0]) && k[3] == 0 && k[6] == 0 &&
                     k[7] == 0 && std::abs(k[8] - 1) <= 1e-3;
-  if (!finite || !form || !(k[0] > 0) || !(k[4] > 0)) {
+  if (!form || !(k[0] > 0) || !(k[4] > 0)) {
     throw_error(ErrorCode::kInput,
                 "{}: expected fx 0 cx / 0 fy cy / 0 0 1 with fx, fy > 0, found "
                 "{:g} {:g} {:g} / {:g} {:g} {:g} / {:g} {:g} {:g}",
@@ -152,24 +164,63 @@ std::vector<std::string> read_names(const NpzReader& npz, const PredictionLayout
   return names;
 }
 
-std::vector<View> read_views(const NpzReader& npz, const PredictionLayout& layout) {
+// The views, and which frames have a pose: tracking that lost a frame leaves NaN or infinity there.
+struct Views {
+  std::vector<View> views;
+  std::vector<bool> lost;
+};
+
+// Intrinsics of another size are sound by themselves; what gives them away is where they put the
+// middle of the picture in every single frame.
+void expect_intrinsics_of_frames(const std::string& where, const Views& all) {
+  size_t known = 0, outside = 0, in_corner = 0;
+  const Pinhole* first = nullptr;
+  for (size_t i = 0; i < all.views.size(); ++i) {
+    if (all.lost[i]) continue;
+    const Pinhole& k = all.views[i].pinhole;
+    if (first == nullptr) first = &k;
+    ++known;
+    outside += k.cx < -0.5 || k.cy < -0.5 || k.cx > k.width - 0.5 || k.cy > k.height - 0.5 ? 1 : 0;
+    // As shares of the width and height; a frame of a few pixels may have its middle there.
+    constexpr int kFewPixels = 8;
+    in_corner += k.cx <= 1 && k.cy <= 1 && std::min(k.width, k.height) > kFewPixels ? 1 : 0;
+  }
+  if (known == 0 || (outside < known && in_corner < known)) return;
+  throw_error(ErrorCode::kInput,
+              "{}: expected intrinsics in pixels of the frames of {} x {}, found a principal point "
+              "({:.6g}, {:.6g}) {} of the frame, and so in every frame; scale fx, cx by {} / width "
+              "and fy, cy by {} / height of the picture that they are of",
+              where, first->width, first->height, first->cx, first->cy,
+              outside == known ? "outside" : "in the corner pixel", first->width, first->height);
+}
+
+Views read_views(const NpzReader& npz, const PredictionLayout& layout) {
   const std::vector<double> poses = npz.read<double>(layout.poses);
   const std::vector<double> intrinsics = npz.read<double>(layout.intrinsics);
   const std::vector<std::string> names = read_names(npz, layout);
   const size_t frames = static_cast<size_t>(layout.frames);
   const size_t stride = frames == 0 ? 12 : poses.size() / frames;
-  std::vector<View> views(frames);
+  Views result{std::vector<View>(frames), std::vector<bool>(frames)};
   for (size_t i = 0; i < frames; ++i) {
+    View& view = result.views[i];
+    view.name = names[i];
     const auto where = [&](const std::string& key) {
       return fmt::format("{}: {}: frame {}", npz.name(), key, i);
     };
-    const Rigid3 pose = internal::pose_from_matrix(std::span(poses).subspan(i * stride, stride),
-                                                   where(layout.poses));
-    views[i].camera_from_world = layout.world_from_camera ? pose.inverse() : pose;
-    views[i].pinhole = read_pinhole(intrinsics.data() + i * 9, layout, where(layout.intrinsics));
-    views[i].name = names[i];
+    const auto pose_values = std::span(poses).subspan(i * stride, stride);
+    result.lost[i] =
+        !all_finite(pose_values) || !all_finite(std::span(intrinsics).subspan(i * 9, 9));
+    if (result.lost[i]) {
+      view.pinhole.width = static_cast<int>(layout.width);
+      view.pinhole.height = static_cast<int>(layout.height);
+      continue;
+    }
+    const Rigid3 pose = internal::pose_from_matrix(pose_values, where(layout.poses));
+    view.camera_from_world = layout.world_from_camera ? pose.inverse() : pose;
+    view.pinhole = read_pinhole(intrinsics.data() + i * 9, layout, where(layout.intrinsics));
   }
-  return views;
+  expect_intrinsics_of_frames(npz.name() + ": " + layout.intrinsics, result);
+  return result;
 }
 
 void read_confidence(const NpzReader& npz, const PredictionLayout& layout, Reconstruction& result,
@@ -200,10 +251,12 @@ void apply_mask(const NpzReader& npz, const PredictionLayout& layout, Reconstruc
 constexpr float kLargestConfidence = 1e30f;
 
 // After this, depth is >= 0 and finite, and confidence can be ranked.
-void drop_invalid_pixels(const std::string& name, Reconstruction& result, ProgressSink& progress) {
+void drop_invalid_pixels(const std::string& name, const std::vector<bool>& lost,
+                         Reconstruction& result, ProgressSink& progress) {
   size_t bad_pixels = 0, bad_depth = 0, bad_confidence = 0;
   std::vector<std::string> empty_frames;
   for (int frame = 0; frame < result.num_frames(); ++frame) {
+    if (lost[static_cast<size_t>(frame)]) continue;  // leaves as a whole
     const size_t begin = static_cast<size_t>(frame) * result.pixels_per_frame();
     bool any = false;
     for (size_t i = begin; i < begin + result.pixels_per_frame(); ++i) {
@@ -222,11 +275,12 @@ void drop_invalid_pixels(const std::string& name, Reconstruction& result, Progre
     }
     if (!any) empty_frames.push_back(result.views[static_cast<size_t>(frame)].name);
   }
-  if (empty_frames.size() == result.views.size()) {
+  const auto placed = static_cast<size_t>(std::ranges::count(lost, false));
+  if (empty_frames.size() == placed) {
     const bool confidence = bad_confidence > bad_depth;
     throw_error(ErrorCode::kInput, "{}: {}: expected {} numbers, found none in any of {} frames",
                 name, confidence ? "confidence" : "depth", confidence ? "finite" : "positive",
-                result.views.size());
+                placed);
   }
   if (bad_depth + bad_confidence > 0) {
     progress.notice(fmt::format(
@@ -315,33 +369,64 @@ void check_limits(const NpzReader& npz, const PredictionLayout& layout, int min_
   }
 }
 
+void drop_lost_frames(const std::string& name, const std::vector<bool>& lost, int min_frames,
+                      Reconstruction& result, ProgressSink& progress) {
+  std::vector<std::string> names;
+  for (size_t frame = 0; frame < lost.size(); ++frame) {
+    if (lost[frame]) names.push_back(result.views[frame].name);
+  }
+  if (names.empty()) return;
+  const size_t left = lost.size() - names.size();
+  if (left < static_cast<size_t>(min_frames)) {
+    throw_error(ErrorCode::kDegenerate,
+                "{}: expected at least {} frames with finite poses and intrinsics, found {} of {}",
+                name, min_frames, left, lost.size());
+  }
+  remove_frames(result, lost);
+  progress.notice(
+      fmt::format("{}: frames whose pose or intrinsics are not finite numbers are left out: {}",
+                  name, fmt::join(names, ", ")));
+}
+
 Reconstruction read_arrays(const NpzReader& npz, ProgressSink& progress, int min_frames) {
   const PredictionLayout layout = find_layout(npz);
   check_limits(npz, layout, min_frames);
   Reconstruction result;
   result.height = static_cast<int>(layout.height);
   result.width = static_cast<int>(layout.width);
-  result.views = read_views(npz, layout);
+  Views all = read_views(npz, layout);
+  result.views = std::move(all.views);
   result.depth.resize(result.num_pixels());
   npz.read_into<float>("depth", result.depth);
+  for (size_t frame = 0; frame < all.lost.size(); ++frame) {
+    if (!all.lost[frame]) continue;
+    const auto begin =
+        result.depth.begin() + static_cast<std::ptrdiff_t>(frame * result.pixels_per_frame());
+    std::fill_n(begin, result.pixels_per_frame(), 0.0f);
+  }
   read_confidence(npz, layout, result, progress);
   apply_mask(npz, layout, result);
-  drop_invalid_pixels(npz.name(), result, progress);
+  if (std::ranges::count(all.lost, false) > 0) {
+    drop_invalid_pixels(npz.name(), all.lost, result, progress);
+  }
   internal::drop_strays(npz.name(), result, progress);
   internal::verify_poses(npz, layout, result, progress);
   read_colors(npz, layout, result, progress);
   internal::move_near(npz, layout, result, progress);
+  drop_lost_frames(npz.name(), all.lost, min_frames, result, progress);
   check_consistent(result);
   return result;
 }
 
-std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key, int num_frames) {
+// The numbers of the keyframes in the epoch's file.
+std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key,
+                                const Reconstruction& epoch) {
   npz.expect_shape(key, std::vector<int64_t>{-1});
   std::vector<int> keyframes;
   for (const int64_t frame : npz.read<int64_t>(key)) {
-    if (frame < 0 || frame >= num_frames) {
+    if (frame < 0 || frame >= epoch.frames_in_file()) {
       throw_error(ErrorCode::kInput, "{}: {}: expected frame numbers from 0 to {}, found {}",
-                  npz.name(), key, num_frames - 1, frame);
+                  npz.name(), key, epoch.frames_in_file() - 1, frame);
     }
     keyframes.push_back(static_cast<int>(frame));
   }
@@ -350,6 +435,35 @@ std::vector<int> read_keyframes(const NpzReader& npz, const std::string& key, in
                 key, fmt::join(keyframes, ", "));
   }
   return keyframes;
+}
+
+void expect_both_epochs(const std::string& name, const JointReconstruction& joint) {
+  if (!joint.keyframes_t1.empty() && !joint.keyframes_t2.empty()) return;
+  throw_error(ErrorCode::kDegenerate, "{}: expected keyframes of both epochs, found {} and {}",
+              name, joint.keyframes_t1.size(), joint.keyframes_t2.size());
+}
+
+// From numbers in the files to frames of the epochs. A keyframe that either the joint pass or its
+// epoch has left out leaves both.
+void match_keyframes(const std::string& name, const Reconstruction& before,
+                     const Reconstruction& after, JointReconstruction& joint) {
+  std::vector<bool> unmatched;
+  int number = 0;  // of the joint pass's frame in its file
+  const auto match = [&](const Reconstruction& epoch, std::vector<int>& keyframes) {
+    std::vector<int> frames;
+    for (const int keyframe : keyframes) {
+      if (!joint.reconstruction.frame_of_number(number++)) continue;
+      const std::optional<int> frame = epoch.frame_of_number(keyframe);
+      unmatched.push_back(!frame);
+      if (frame) frames.push_back(*frame);
+    }
+    keyframes = frames;
+  };
+  match(before, joint.keyframes_t1);
+  match(after, joint.keyframes_t2);
+  joint.reconstruction.left_out.clear();  // the numbers have served
+  if (std::ranges::count(unmatched, true) > 0) remove_frames(joint.reconstruction, unmatched);
+  expect_both_epochs(name, joint);
 }
 
 }  // namespace
@@ -377,18 +491,15 @@ JointReconstruction read_joint(const std::filesystem::path& path, const Reconstr
                                const Reconstruction& after, ProgressSink& progress) try {
   const NpzReader npz(path);
   JointReconstruction joint;
-  joint.keyframes_t1 = read_keyframes(npz, "keyframes_t1", before.num_frames());
-  joint.keyframes_t2 = read_keyframes(npz, "keyframes_t2", after.num_frames());
-  if (joint.keyframes_t1.empty() || joint.keyframes_t2.empty()) {
-    throw_error(ErrorCode::kDegenerate, "{}: expected keyframes of both epochs, found {} and {}",
-                npz.name(), joint.keyframes_t1.size(), joint.keyframes_t2.size());
-  }
+  joint.keyframes_t1 = read_keyframes(npz, "keyframes_t1", before);
+  joint.keyframes_t2 = read_keyframes(npz, "keyframes_t2", after);
+  expect_both_epochs(npz.name(), joint);
   joint.reconstruction = read_arrays(npz, progress, 2);
   const Reconstruction& result = joint.reconstruction;
-  if (joint.keyframes_t1.size() + joint.keyframes_t2.size() != result.views.size()) {
+  const size_t frames = static_cast<size_t>(result.frames_in_file());
+  if (joint.keyframes_t1.size() + joint.keyframes_t2.size() != frames) {
     throw_error(ErrorCode::kInput, "{}: expected one frame per keyframe ({} + {}), found {} frames",
-                npz.name(), joint.keyframes_t1.size(), joint.keyframes_t2.size(),
-                result.views.size());
+                npz.name(), joint.keyframes_t1.size(), joint.keyframes_t2.size(), frames);
   }
   for (const Reconstruction* epoch : {&before, &after}) {
     if (epoch->width != result.width || epoch->height != result.height) {
@@ -398,6 +509,7 @@ JointReconstruction read_joint(const std::filesystem::path& path, const Reconstr
                   result.height);
     }
   }
+  match_keyframes(npz.name(), before, after, joint);
   return joint;
 } catch (...) {
   rethrow_naming(path);

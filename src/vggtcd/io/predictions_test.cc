@@ -327,10 +327,85 @@ TEST(ReadReconstruction, WrongValuesAreNamed) {
     EXPECT_INPUT_ERROR(f.read(arrays), message);
   };
   expect("extrinsic", 12, 2.0f, "extrinsic: frame 1: expected a rotation");
-  expect("extrinsic", 27, NAN, "extrinsic: frame 2: expected finite numbers");
+  expect("extrinsic", 27, 1e20f, "extrinsic: frame 2: expected coordinates from -1e13 to 1e13");
   expect("intrinsic", 9, -5.0f, "intrinsic: frame 1: expected fx 0 cx");
   expect("intrinsic", 8, 0.0f, "intrinsic: frame 0: expected fx 0 cx");
   expect("images", 3, 200.0f, "images: expected values in [0, 1], found 200");
+}
+
+// Frames that tracking lost have NaN or infinity for a pose (ScanNet: -inf in all of it).
+void lose_frame(Arrays& arrays, size_t frame) {
+  std::fill_n(arrays["extrinsic"].begin() + static_cast<std::ptrdiff_t>(12 * frame), 12,
+              -std::numeric_limits<float>::infinity());
+}
+
+TEST(ReadReconstruction, FramesWithoutAFinitePoseAreLeftOutAndNamed) {
+  Fixture f;
+  Arrays arrays = Arrays::vggt();
+  lose_frame(arrays, 1);
+  arrays["intrinsic"][9 * 3] = NAN;  // of frame 3
+  const Reconstruction whole =
+      read_reconstruction(source_file("tests/golden/npz/vggt.npz"), f.progress);
+  const Reconstruction r = f.read(arrays);
+  EXPECT_THAT(r.left_out, ElementsAre(1, 3));
+  EXPECT_THAT(f.progress.notices,
+              ElementsAre(HasSubstr("are left out: frame_000001, frame_000003")));
+  ASSERT_EQ(r.num_frames(), 2);
+  for (const int frame : {0, 1}) {
+    const int number = 2 * frame;
+    EXPECT_EQ(r.number_of_frame(frame), number);
+    EXPECT_EQ(r.frame_of_number(number), frame);
+    EXPECT_EQ(r.views[static_cast<size_t>(frame)].name,
+              whole.views[static_cast<size_t>(number)].name);
+    EXPECT_TRUE(std::ranges::equal(r.frame_depth(frame), whole.frame_depth(number)));
+    EXPECT_TRUE(std::ranges::equal(r.frame_confidence(frame), whole.frame_confidence(number)));
+    EXPECT_TRUE(std::ranges::equal(r.frame_color(frame), whole.frame_color(number)));
+  }
+  EXPECT_EQ(r.frame_of_number(1), std::nullopt);
+  EXPECT_EQ(r.frame_of_number(4), std::nullopt);
+  EXPECT_EQ(find_frame(r, "2"), 1);  // a number is the file's
+  EXPECT_EQ(find_frame(r, "3"), std::nullopt);
+  EXPECT_EQ(find_frame(r, "frame_000002"), 1);
+}
+
+TEST(ReadReconstruction, TooFewFramesWithAPoseAreDegenerate) {
+  Fixture f;
+  Arrays arrays = Arrays::vggt();
+  for (const size_t frame : {size_t{0}, size_t{1}, size_t{3}}) lose_frame(arrays, frame);
+  EXPECT_ERROR(f.read(arrays), ErrorCode::kDegenerate,
+               "expected at least 2 frames with finite poses and intrinsics, found 1 of 4");
+  lose_frame(arrays, 2);
+  EXPECT_ERROR(f.read(arrays), ErrorCode::kDegenerate, "found 0 of 4");
+}
+
+TEST(ReadReconstruction, IntrinsicsOfAnotherPictureSizeAreRefused) {
+  const auto scaled = [](double x, double y, size_t frames) {
+    Arrays arrays = Arrays::vggt();
+    for (size_t i = 0; i < frames; ++i) {
+      float* k = arrays["intrinsic"].data() + 9 * i;
+      for (const size_t at : {size_t{0}, size_t{2}}) k[at] *= static_cast<float>(x);
+      for (const size_t at : {size_t{4}, size_t{5}}) k[at] *= static_cast<float>(y);
+    }
+    return arrays;
+  };
+  Fixture f;
+  EXPECT_INPUT_ERROR(f.read(scaled(20, 20, kFrames)),
+                     "t1.npz: intrinsic: expected intrinsics in pixels of the frames of 8 x 6");
+  EXPECT_INPUT_ERROR(f.read(scaled(20, 20, kFrames)),
+                     "outside of the frame, and so in every frame");
+  // Shares of the width and height, in frames that are no few pixels.
+  Arrays shares;
+  shares.set("extrinsic", {2, 3, 4}, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0,  //
+                                      1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0});
+  shares.set("intrinsic", {2, 3, 3},
+             {0.8f, 0, 0.5f, 0, 1.1f, 0.5f, 0, 0, 1,  //
+              0.8f, 0, 0.5f, 0, 1.1f, 0.5f, 0, 0, 1});
+  shares.set("depth", {2, 12, 16}, std::vector<float>(2 * 12 * 16, 1));
+  EXPECT_INPUT_ERROR(f.read(shares), "(0.5, 0.5) in the corner pixel of the frame");
+  // One frame that was cut off centre may be right. The points are of the others' cameras.
+  Arrays cropped = scaled(20, 20, 1);
+  cropped.remove("world_points"), cropped.remove("world_points_from_depth");
+  EXPECT_EQ(f.read(cropped).num_frames(), 4);
 }
 
 TEST(ReadReconstruction, RefusesAMirroredPose) {
@@ -443,6 +518,43 @@ TEST(ReadJoint, RefusesKeyframesThatDoNotFit) {
   EXPECT_INPUT_ERROR(f.write_and_read(), "expected one frame per keyframe (1 + 2), found 4 frames");
   f.joint.keyframes_t1 = {};
   EXPECT_ERROR(f.write_and_read(), ErrorCode::kDegenerate, "expected keyframes of both epochs");
+}
+
+// Joint frames 0 to 3 are T1's frames 0 and 2, T2's 1 and 3 (numbers of the files).
+TEST(ReadJoint, KeyframesOfFramesThatWereLeftOutLeave) {
+  JointFixture f;
+  Reconstruction t1 = f.epoch, t2 = f.epoch;
+  remove_frames(t1, {false, true, false, false});  // 0, 2, 3 are left: 2 is the second
+  remove_frames(t2, {false, true, false, false});  // keyframe 1 is gone: 3 is the third
+  write_joint(f.directory / "joint.npz", f.joint);
+  const JointReconstruction joint = read_joint(f.directory / "joint.npz", t1, t2, f.progress);
+  EXPECT_THAT(joint.keyframes_t1, ElementsAre(0, 1));
+  EXPECT_THAT(joint.keyframes_t2, ElementsAre(2));
+  ASSERT_EQ(joint.reconstruction.num_frames(), 3);
+  EXPECT_TRUE(std::ranges::equal(joint.reconstruction.frame_depth(2), f.epoch.frame_depth(3)));
+}
+
+TEST(ReadJoint, AJointPassThatLostAFrameLosesItsKeyframe) {
+  JointFixture f;
+  Arrays arrays = Arrays::vggt();
+  lose_frame(arrays, 1);
+  const std::vector<int64_t> t1{0, 2}, t2{1, 3};
+  NpzWriter npz(f.directory / "joint.npz");
+  for (size_t i = 0; i < arrays.keys.size(); ++i) {
+    npz.add<float>(arrays.keys[i], arrays.shapes[i], arrays.values[i]);
+  }
+  npz.add<int64_t>("keyframes_t1", {2}, t1);
+  npz.add<int64_t>("keyframes_t2", {2}, t2);
+  npz.finish();
+  const JointReconstruction joint =
+      read_joint(f.directory / "joint.npz", f.epoch, f.epoch, f.progress);
+  EXPECT_THAT(joint.keyframes_t1, ElementsAre(0));
+  EXPECT_THAT(joint.keyframes_t2, ElementsAre(1, 3));
+  EXPECT_EQ(joint.reconstruction.num_frames(), 3);
+  Reconstruction without = f.epoch;
+  remove_frames(without, {true, false, false, false});
+  EXPECT_ERROR(read_joint(f.directory / "joint.npz", without, f.epoch, f.progress),
+               ErrorCode::kDegenerate, "expected keyframes of both epochs, found 0 and 2");
 }
 
 TEST(ReadJoint, RefusesAnEpochFileAndOtherFrameSizes) {

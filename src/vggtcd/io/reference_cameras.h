@@ -15,10 +15,9 @@ struct ReferenceCamera {
 };
 
 // A directory with a COLMAP model or one of its images.txt, images.bin: camera centres. Otherwise a
-// text file, # for comments: eight numbers a line are TUM's "timestamp tx ty tz qx qy qz qw" (the
-// name is the time stamp), anything else is "name x y z", separated by spaces, tabs, commas or
-// semicolons; a name may hold spaces, and a first line without numbers is a heading. Throws
-// Error{kInput} naming file and line, also for a name that comes twice.
+// table (camera_table.h); eight numbers a line are TUM's "timestamp tx ty tz qx qy qz qw", the name
+// is the time stamp then. Throws Error{kInput} naming file and line, also for a name that comes
+// twice.
 std::vector<ReferenceCamera> read_reference_cameras(const std::filesystem::path& path);
 
 }  // namespace vggtcd

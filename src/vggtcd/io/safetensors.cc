@@ -7,7 +7,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <numeric>
-#include <set>
+#include <unordered_set>
 #include <utility>
 
 #include "vggtcd/core/error.h"
@@ -21,7 +21,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr uint64_t kMaxHeaderBytes = 100'000'000;  // the format's own limit
-constexpr int kMaxDepth = 3;                       // {tensor: {shape: [numbers]}}
+constexpr size_t kMaxDepth = 3;                    // {tensor: {shape: [numbers]}}
 constexpr size_t kMaxRank = 16;
 
 constexpr std::array<std::pair<std::string_view, DType>, 10> kDTypes = {{{"F64", DType::kF64},
@@ -38,6 +38,48 @@ constexpr std::array<std::pair<std::string_view, DType>, 10> kDTypes = {{{"F64",
 std::string_view safetensors_dtype(DType dtype) {
   return std::ranges::find(kDTypes, dtype, [](const auto& entry) { return entry.second; })->first;
 }
+
+// What the parser does not check: bounded depth, no name twice. It goes over the text before
+// anything is built; a callback of the parser would look through all tensors after each of them.
+class StructureCheck : public nlohmann::json_sax<Json> {
+ public:
+  std::string wrong;  // empty: sound JSON of the depth of a header
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool start_object(size_t) override { return enter(); }
+  bool start_array(size_t) override { return enter(); }
+  bool end_object() override { return leave(); }
+  bool end_array() override { return leave(); }
+  bool key(string_t& name) override {
+    return keys_.back().insert(name).second || found(fmt::format("names {} twice", quote(name)));
+  }
+  bool parse_error(size_t byte, const std::string&, const Json::exception& error) override {
+    const bool range = dynamic_cast<const Json::out_of_range*>(&error) != nullptr;
+    return found(range ? "has a number out of range"
+                       : fmt::format("is not valid JSON at byte {}", byte));
+  }
+
+ private:
+  bool found(std::string what) {
+    wrong = std::move(what);
+    return false;  // the parser stops
+  }
+  bool enter() {
+    keys_.emplace_back();
+    return keys_.size() <= kMaxDepth || found("is nested too deeply");
+  }
+  bool leave() {
+    keys_.pop_back();
+    return true;
+  }
+  std::vector<std::unordered_set<std::string>> keys_;  // of the objects that are open
+};
 
 // Throws "FILE: ...": everything that is wrong is wrong with the file.
 class Reader {
@@ -86,31 +128,10 @@ class Reader {
     const std::string_view text(reinterpret_cast<const char*>(bytes_.data()) + 8, length);
     data_ = bytes_.subspan(8 + length);
     if (!text.starts_with('{')) fail("safetensors header does not start with a brace; not weights");
-    try {
-      return Json::parse(text, [this, keys = std::vector<std::set<std::string>>(kMaxDepth + 1)](
-                                   int depth, Json::parse_event_t event, Json& value) mutable {
-        check_structure(depth, event, value, keys);
-        return true;
-      });
-    } catch (const Json::parse_error& error) {
-      fail("safetensors header is not valid JSON at byte {}", error.byte);
-    } catch (const Json::exception&) {
-      fail("safetensors header has a number out of range");
-    }
-  }
-
-  // Called for every part of the JSON while it is read: bounded depth, no name twice.
-  void check_structure(int depth, Json::parse_event_t event, const Json& value,
-                       std::vector<std::set<std::string>>& keys) const {
-    using Event = Json::parse_event_t;
-    if (depth > kMaxDepth) fail("safetensors header is nested too deeply");
-    const size_t level = static_cast<size_t>(depth);
-    if (event == Event::object_start && level < static_cast<size_t>(kMaxDepth)) {
-      keys[level + 1].clear();
-    }
-    if (event == Event::key && !keys[level].insert(value.get<std::string>()).second) {
-      fail("safetensors header names {} twice", quote(value.get<std::string>()));
-    }
+    StructureCheck structure;
+    Json::sax_parse(text, &structure);
+    if (!structure.wrong.empty()) fail("safetensors header {}", structure.wrong);
+    return Json::parse(text);
   }
 
   std::map<std::string, std::string> metadata(const Json& value) const {
@@ -211,6 +232,12 @@ class Reader {
   const std::string& name_;
 };
 
+// As the library that writes the header judges it.
+bool is_utf8(const std::string& text) {
+  return Json(text).dump(-1, ' ', false, Json::error_handler_t::ignore) ==
+         Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 uint64_t byte_size(const TensorInfo& tensor) {
   uint64_t size = dtype_size(tensor.dtype);
   for (const int64_t length : tensor.shape) size *= static_cast<uint64_t>(length);
@@ -222,12 +249,15 @@ std::string header_text(std::span<const TensorInfo> tensors, const std::vector<s
                         const std::map<std::string, std::string>& metadata) {
   nlohmann::ordered_json header = nlohmann::ordered_json::object();
   if (!metadata.empty()) header["__metadata__"] = metadata;
+  auto& entries = header.get_ref<nlohmann::ordered_json::object_t&>();
   uint64_t offset = 0;
   for (const size_t i : order) {
     const uint64_t end = offset + byte_size(tensors[i]);
-    header[tensors[i].name] = {{"dtype", safetensors_dtype(tensors[i].dtype)},
-                               {"shape", tensors[i].shape},
-                               {"data_offsets", {offset, end}}};
+    // At the end, without a search among the others for the name.
+    entries.emplace_back(tensors[i].name,
+                         nlohmann::ordered_json{{"dtype", safetensors_dtype(tensors[i].dtype)},
+                                                {"shape", tensors[i].shape},
+                                                {"data_offsets", {offset, end}}});
     offset = end;
   }
   std::string text = header.dump();
@@ -245,6 +275,14 @@ WeightFile parse_safetensors(std::span<const std::byte> bytes, const std::string
 void write_safetensors(const std::filesystem::path& path, std::span<const TensorInfo> tensors,
                        const std::map<std::string, std::string>& metadata,
                        const std::function<void(size_t, std::span<std::byte>)>& fill) {
+  for (const TensorInfo& tensor : tensors) {
+    if (is_utf8(tensor.name)) continue;
+    throw_error(
+        ErrorCode::kWeights,
+        "{}: tensor {}: expected a name in UTF-8, for safetensors holds no other; rename it "
+        "in the checkpoint",
+        path.string(), quote(tensor.name));
+  }
   std::vector<size_t> order(tensors.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::ranges::stable_sort(order, std::greater{},

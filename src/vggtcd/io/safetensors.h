@@ -28,8 +28,8 @@ struct TensorInfo {
 
 // Writes the tensors in the given order but wider types first, so that all are aligned.
 // fill(i, data) is called once per tensor, in the order of the file, and writes tensor i; so only
-// one tensor has to be in memory. Throws Error{kOutput}, and what fill throws; then nothing is left
-// behind.
+// one tensor has to be in memory. Throws Error{kOutput}, Error{kWeights} for a name that is not
+// UTF-8, and what fill throws; then nothing is left behind.
 void write_safetensors(const std::filesystem::path& path, std::span<const TensorInfo> tensors,
                        const std::map<std::string, std::string>& metadata,
                        const std::function<void(size_t, std::span<std::byte>)>& fill);

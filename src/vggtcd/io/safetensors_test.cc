@@ -206,6 +206,13 @@ TEST_F(SafetensorsWriter, WhatIsWrittenIsReadAgain) {
   }
 }
 
+TEST_F(SafetensorsWriter, ANameThatIsNotUtf8IsShownEscaped) {
+  const std::vector<TensorInfo> infos = {{"head.\xff\xfe.weight", DType::kF32, {1}}};
+  EXPECT_ERROR(write_safetensors(directory_ / "out", infos, {}, {}), ErrorCode::kWeights,
+               R"(tensor "head.\xff\xfe.weight": expected a name in UTF-8)");
+  EXPECT_EQ(directory_.num_files(), 0u);
+}
+
 TEST_F(SafetensorsWriter, FailureLeavesNothingBehind) {
   const std::vector<TensorInfo> infos = {{"a", DType::kF32, {1}}};
   const auto fail = [](size_t, std::span<std::byte>) {

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/coordinate.h"
 #include "vggtcd/io/failure.h"
 #include "vggtcd/io/npz.h"
 #include "vggtcd/io/pose_matrix.h"
@@ -17,11 +18,16 @@ using RowMajor33 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 Sim3 checked(double scale, const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation,
              const std::string& where) {
-  if (!(scale > 0) || !std::isfinite(scale)) {
+  if (!(scale > 0)) {
     throw_error(ErrorCode::kInput, "{}: expected a scale above 0, found {}", where, scale);
   }
-  if (!translation.allFinite()) {
-    throw_error(ErrorCode::kInput, "{}: expected a finite translation", where);
+  if (!is_coordinate(scale) || !is_coordinate(1 / scale)) {
+    throw_error(ErrorCode::kInput, "{}: expected a scale from {:g} to {:g}, found {}", where,
+                1 / kLargestCoordinate, kLargestCoordinate, scale);
+  }
+  if (!are_coordinates(translation)) {
+    throw_error(ErrorCode::kInput, "{}: translation: expected {}, found {:g} {:g} {:g}", where,
+                kCoordinateRange, translation.x(), translation.y(), translation.z());
   }
   return {scale, internal::nearest_rotation(rotation, where), translation};
 }

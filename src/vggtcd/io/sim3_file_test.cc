@@ -56,6 +56,10 @@ TEST(Sim3File, RefusesWhatIsNoSimilarity) {
          "a.json: translation: expected 3 numbers");
   expect(R"({"scale": 0, "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, 3]})",
          "a.json: expected a scale above 0, found 0");
+  expect(R"({"scale": 1e308, "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, 3]})",
+         "a.json: expected a scale from 1e-13 to 1e+13, found 1e+308");
+  expect(R"({"scale": 1, "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 1e300, 3]})",
+         "a.json: translation: expected coordinates from -1e13 to 1e13");
   expect(R"({"scale": 1, "rotation": [[1,0,0],[0,1,0],[0,0,-1]], "translation": [1, 2, 3]})",
          "a.json: expected a rotation");
   const TemporaryDirectory directory;

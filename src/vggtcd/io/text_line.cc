@@ -6,6 +6,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/io/coordinate.h"
 
 namespace vggtcd {
 namespace {
@@ -38,9 +39,18 @@ std::string_view TextLine::rest(size_t i) const {
 
 double TextLine::number(size_t i) const {
   const std::string_view text = word(i);
-  const auto value = number_in<double>(text);
-  if (!value || !std::isfinite(*value)) fail("a number", text);
+  const auto value = signed_number_in(text);
+  if (!value || !std::isfinite(*value)) {
+    const bool comma = text.find(',') != std::string_view::npos;
+    fail(comma ? "a number with a decimal point" : "a number", text);
+  }
   return *value;
+}
+
+double TextLine::coordinate(size_t i) const {
+  const double value = number(i);
+  if (!is_coordinate(value)) fail(kCoordinateRange, word(i));
+  return value;
 }
 
 int64_t TextLine::integer(size_t i) const {

@@ -21,8 +21,9 @@ class TextLine {
   size_t size() const { return words_.size(); }
   std::string_view word(size_t i) const;
   std::string_view rest(
-      size_t i) const;            // from word i to the end of the line, for names with spaces
-  double number(size_t i) const;  // finite
+      size_t i) const;                // from word i to the end of the line, for names with spaces
+  double number(size_t i) const;      // finite; a plus may stand before it
+  double coordinate(size_t i) const;  // a number that coordinate.h admits
   int64_t integer(size_t i) const;
   // Words at the places of x, y, z and w; a norm within 1 % of 1 is normalised.
   Eigen::Quaterniond unit_quaternion(const std::array<size_t, 4>& xyzw) const;

@@ -3,6 +3,7 @@
 #include "vggtcd/io/trajectory.h"
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/core/number_text.h"
 #include "vggtcd/core/tensor_view.h"
 #include "vggtcd/io/colmap.h"
 #include "vggtcd/io/file_system.h"
@@ -32,20 +33,39 @@ Trajectory read_npy_poses(const std::filesystem::path& path, PoseConvention conv
   return trajectory;
 }
 
+bool are_numbers_in_order(const Trajectory& trajectory) {
+  for (size_t i = 0; i < trajectory.size(); ++i) {
+    if (signed_number_in(trajectory[i].name) != static_cast<double>(i)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-Trajectory read_trajectory(const std::filesystem::path& path, PoseConvention npy_convention) {
+TrajectoryFile read_trajectory_file(const std::filesystem::path& path,
+                                    PoseConvention npy_convention) {
   if (!exists_at(path)) {
     throw_error(ErrorCode::kInput,
                 "{}: expected poses (.npy), a COLMAP model or a TUM file, found {}", path.string(),
                 what_stands_at(path));
   }
-  if (path.extension() == ".npy") return read_npy_poses(path, npy_convention);
-  if (is_folder(path)) return colmap_trajectory(read_colmap(path));
-  if (path.filename() == "images.txt" || path.filename() == "images.bin") {
-    return colmap_trajectory(read_colmap(path.parent_path().empty() ? "." : path.parent_path()));
+  const bool is_directory = is_folder(path);
+  if (path.extension() == ".npy" && !is_directory) {
+    return {read_npy_poses(path, npy_convention), PoseNames::kNumbers};
   }
-  return read_tum(path);
+  if (is_directory) return {read_colmap_trajectory(path), PoseNames::kPhotos};
+  if (path.filename() == "images.txt" || path.filename() == "images.bin") {
+    const std::filesystem::path folder = path.parent_path();
+    return {read_colmap_trajectory(folder.empty() ? "." : folder), PoseNames::kPhotos};
+  }
+  Trajectory poses = read_tum(path);
+  const PoseNames names =
+      are_numbers_in_order(poses) ? PoseNames::kNumbers : PoseNames::kTimeStamps;
+  return {std::move(poses), names};
+}
+
+Trajectory read_trajectory(const std::filesystem::path& path, PoseConvention npy_convention) {
+  return read_trajectory_file(path, npy_convention).poses;
 }
 
 void write_npy_poses(const std::filesystem::path& path, std::span<const NamedPose> trajectory,

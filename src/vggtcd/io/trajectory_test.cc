@@ -76,7 +76,49 @@ TEST(Tum, RefusesBrokenLinesByNumber) {
   expect("0 1 2 3 0 0 0\n", "a.tum:1: expected timestamp tx ty tz qx qy qz qw, found 7 words");
   expect("# c\n0 1 2 x 0 0 0 1\n", "a.tum:2: expected a number, found x");
   expect("0 1 2 3 0 0 0 0\n", "a.tum:1: expected a unit quaternion, found norm 0");
+  // No inverse pose, no mean and no square of such numbers is right.
+  expect("0 1 2 1.7e308 0 0 0 1\n", "a.tum:1: expected coordinates from -1e13 to 1e13");
+  expect("0 1 2 -1e308 0 0 0 1\n", "a.tum:1: expected coordinates from -1e13 to 1e13");
+  expect("0 1 2 1,5 0 0 0 1\n", "a.tum:1: expected a number with a decimal point, found 1,5");
+  expect("0 1 2 +-3 0 0 0 1\n", "a.tum:1: expected a number, found +-3");
+  expect(std::string("\xff\xfe"
+                     "0\0",
+                     4),
+         "a.tum: expected text in UTF-8, found UTF-16");
   expect("0 1 2 \x01\xff 0 0 0 1\n", "expected a number, found ??");
+}
+
+TEST(Tum, ReadsWhatSpreadsheetsAndScriptsSave) {
+  const TemporaryDirectory directory;
+  write_bytes(directory / "a.tum",
+              "\xef\xbb\xbf"
+              "1.5 +1 -2 1e13 0 0 0 1\r2.5 0 0 0 0 0 0 +1\r\n");
+  const TrajectoryFile file =
+      read_trajectory_file(directory / "a.tum", PoseConvention::kCameraFromWorld);
+  ASSERT_EQ(file.poses.size(), 2u);
+  EXPECT_EQ(file.names, PoseNames::kTimeStamps);
+  EXPECT_EQ(file.poses[0].name, "1.5");
+  EXPECT_EQ(camera_center(file.poses[0].camera_from_world), Eigen::Vector3d(1, -2, 1e13));
+}
+
+TEST(ReadTrajectory, NumbersInOrderAreNoTimeStamps) {
+  const TemporaryDirectory directory;
+  const auto names_of = [&](std::string_view content) {
+    write_bytes(directory / "a.tum", content);
+    return read_trajectory_file(directory / "a.tum", PoseConvention::kCameraFromWorld).names;
+  };
+  EXPECT_EQ(names_of("0 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1\n"), PoseNames::kNumbers);
+  EXPECT_EQ(names_of("1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n"), PoseNames::kTimeStamps);
+  EXPECT_EQ(names_of("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n"), PoseNames::kTimeStamps);
+}
+
+TEST(ReadTrajectory, NumpyPosesFarBeyondAnyPlaceAreRefused) {
+  const TemporaryDirectory directory;
+  const std::vector<int64_t> shape{1, 3, 4};
+  const std::vector<double> values{1, 0, 0, 0, 0, 1, 0, -1e308, 0, 0, 1, 0};
+  write_npy_file(directory / "a.npy", shape, values);
+  EXPECT_INPUT_ERROR(read_trajectory(directory / "a.npy", PoseConvention::kWorldFromCamera),
+                     "a.npy: pose 0: expected coordinates from -1e13 to 1e13");
 }
 
 TEST(ReadTrajectory, NumpyPosesInBothConventions) {

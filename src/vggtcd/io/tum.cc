@@ -3,12 +3,12 @@
 #include "vggtcd/io/tum.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/failure.h"
 #include "vggtcd/io/input_file.h"
 #include "vggtcd/io/output_file.h"
+#include "vggtcd/io/text_file.h"
 #include "vggtcd/io/text_line.h"
 
 namespace vggtcd {
@@ -29,18 +29,16 @@ void write_tum(const std::filesystem::path& path, const Trajectory& trajectory,
 }
 
 Trajectory read_tum(const std::filesystem::path& path) try {
-  InputFile file(path, "a trajectory file");
   Trajectory trajectory;
-  std::string line;
-  for (int number = 1; std::getline(file, line); ++number) {
+  for_each_text_line(path, "a trajectory file", [&](int number, std::string_view line) {
     const TextLine words(path, number, line);
-    if (words.is_blank_or_comment()) continue;
+    if (words.is_blank_or_comment()) return;
     words.expect_count(8, "timestamp tx ty tz qx qy qz qw");
     words.number(0);
     const Eigen::Quaterniond q = words.unit_quaternion({4, 5, 6, 7});
-    const Eigen::Vector3d t(words.number(1), words.number(2), words.number(3));
+    const Eigen::Vector3d t(words.coordinate(1), words.coordinate(2), words.coordinate(3));
     trajectory.push_back({std::string(words.word(0)), Rigid3{q.toRotationMatrix(), t}.inverse()});
-  }
+  });
   if (trajectory.empty()) {
     throw_error(ErrorCode::kInput, "{}: expected camera poses, found none", path.string());
   }

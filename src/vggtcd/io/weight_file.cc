@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <regex>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/interrupt.h"
@@ -12,6 +13,7 @@
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/safetensors.h"
 #include "vggtcd/io/torch_checkpoint.h"
+#include "vggtcd/io/weight_shards.h"
 
 namespace vggtcd {
 namespace {
@@ -37,6 +39,41 @@ void throw_if_text(std::string_view start, const std::string& name) {
   if (printable) {
     throw_error(ErrorCode::kWeights, "{}: expected weights, found text; download the file again",
                 name);
+  }
+}
+
+// One of several files is taken for the whole only when its tensors are missed: say it at once.
+void throw_if_shard(const std::filesystem::path& path) {
+  static const std::regex kShard("-[0-9]{5}-of-([0-9]{5})\\.[a-z]+$");
+  std::smatch match;
+  const std::string name = path.filename().string();
+  if (!std::regex_search(name, match, kShard) || match[1] == "00001") return;
+  throw_error(ErrorCode::kWeights,
+              "{}: expected a whole checkpoint, found one of {} shards; name the folder, or the "
+              "index (model.safetensors.index.json) beside it",
+              path.string(), std::stoi(match[1]));
+}
+
+// Without what wrappers put before every name; torch.compile also wraps parts of a network.
+void remove_wrappers(WeightFile& file) {
+  constexpr std::array<std::string_view, 3> kWrappers = {"module.", "_orig_mod.", "model."};
+  const auto all_begin_with = [&](std::string_view prefix) {
+    return std::ranges::all_of(file.tensors, [&](const TensorView& tensor) {
+      return tensor.name.size() > prefix.size() && tensor.name.starts_with(prefix);
+    });
+  };
+  for (bool more = !file.tensors.empty(); more;) {
+    const auto* wrapper = std::ranges::find_if(kWrappers, all_begin_with);
+    more = wrapper != kWrappers.end();
+    if (!more) break;
+    for (TensorView& tensor : file.tensors) tensor.name.erase(0, wrapper->size());
+    file.removed_prefix += *wrapper;
+  }
+  constexpr std::string_view kCompiledPart = "._orig_mod.";
+  for (TensorView& tensor : file.tensors) {
+    for (size_t at; (at = tensor.name.find(kCompiledPart)) != std::string::npos;) {
+      tensor.name.erase(at, kCompiledPart.size() - 1);
+    }
   }
 }
 
@@ -77,11 +114,18 @@ WeightFile parse_weight_file(std::span<const std::byte> bytes, const std::string
               "{}: expected safetensors or a PyTorch checkpoint, found neither", name);
 }
 
-WeightFile open_weight_file(const std::filesystem::path& path) try {
+WeightFile open_weight_file(const std::filesystem::path& given) try {
+  const std::filesystem::path path = weight_path(given);
   if (!is_file(path)) {
     throw_error(ErrorCode::kWeights, "{}: expected network weights, found {}", path.string(),
                 what_stands_at(path));
   }
+  if (const auto index = read_shard_index(path)) {
+    WeightFile file = open_shards(*index);
+    remove_wrappers(file);
+    return file;
+  }
+  throw_if_shard(path);
   const auto mapped = std::make_shared<const MappedFile>(path);
   WeightFile file = [&] {
     try {
@@ -94,6 +138,7 @@ WeightFile open_weight_file(const std::filesystem::path& path) try {
   // Both the mapping and what the parser had to copy must live as long as the tensors.
   file.storage = std::make_shared<const std::array<std::shared_ptr<const void>, 2>>(
       std::array<std::shared_ptr<const void>, 2>{mapped, file.storage});
+  remove_wrappers(file);
   return file;
 } catch (...) {
   rethrow_naming(path);

@@ -361,7 +361,7 @@ void write_cameras(const std::filesystem::path& directory, const Reconstruction&
   write_tum(directory / "cameras_after.tum", trajectory_of(views_t2), comment);
   views.insert(views.end(), views_t2.begin(), views_t2.end());
   make_folder(directory / "colmap");
-  write_colmap_text(directory / "colmap", views);
+  write_colmap(directory / "colmap", views);
 }
 
 void write_authors_layout(const std::filesystem::path& directory, const Reconstruction& before,

@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "vggtcd/io/file_system.h"
+#include "vggtcd/io/weight_shards.h"
 #include "vggtcd/reconstruction/classical_reconstructor.h"
 #include "vggtcd/reconstruction/vggt_reconstructor.h"
 
@@ -47,12 +48,12 @@ std::filesystem::path require_weights(const std::string& given) {
                 "~/.local/share/vggt-cd/model.safetensors; {}",
                 kWithoutWeights);
   }
-  if (!is_file(weights)) {
+  if (!exists_at(weights)) {
     throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found {}; {}",
                 given.empty() ? "VGGTCD_WEIGHTS: " : "", weights, what_stands_at(weights),
                 kWithoutWeights);
   }
-  return weights;
+  return weight_path(weights);  // of a folder
 }
 
 std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& options,

@@ -347,6 +347,8 @@ std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const
     JointReconstruction joint = joint_of_keyframes(before, after, options_.keyframes);
     renumber(photos.before, before, joint.keyframes_t1);
     renumber(photos.after, after, joint.keyframes_t2);
+    joint.keyframes_t1 = numbers_in_file(photos.before, joint.keyframes_t1);
+    joint.keyframes_t2 = numbers_in_file(photos.after, joint.keyframes_t2);
     write_joint(folder / kJointFile, joint);
   }
   const auto made = [](int placed, const Reconstruction& result, const EpochPhotos& of) {

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/coordinate.h"
 #include "vggtcd/io/failure.h"
 #include "vggtcd/io/input_file.h"
 
@@ -27,9 +28,35 @@ class ByteReader {
     at_ += sizeof value;
     return value;
   }
+  double take_coordinate() {
+    const double value = take<double>();
+    if (!is_coordinate(value)) fail(kCoordinateRange, value);
+    return value;
+  }
   Eigen::Vector3d take_vector() {
-    const double x = take<double>(), y = take<double>(), z = take<double>();
+    const double x = take_coordinate(), y = take_coordinate(), z = take_coordinate();
     return {x, y, z};
+  }
+  Eigen::Quaterniond take_rotation() {
+    const double w = take_coordinate();
+    const Eigen::Vector3d xyz = take_vector();
+    const Eigen::Quaterniond q(w, xyz.x(), xyz.y(), xyz.z());
+    if (!(std::abs(q.norm() - 1) <= 1e-2)) fail("a unit quaternion", q.norm());
+    return q.normalized();
+  }
+  int take_side() {
+    constexpr uint64_t kMaxSide = 1 << 20;
+    const auto side = take<uint64_t>();
+    if (side < 1 || side > kMaxSide) fail("the side of a photo in px", static_cast<double>(side));
+    return static_cast<int>(side);
+  }
+  double take_focal() {
+    const double focal = take_coordinate();
+    if (!(focal > 0)) fail("a focal length above 0", focal);
+    return focal;
+  }
+  [[noreturn]] void fail(std::string_view expected, double found) const {
+    throw_error(ErrorCode::kInput, "{}: expected {}, found {:g}", name_, expected, found);
   }
   std::string take_text() {
     std::string text;
@@ -72,12 +99,12 @@ std::map<uint32_t, RadialCamera> read_cameras(const std::filesystem::path& path)
                   in.name(), kSimplePinhole, kSimpleRadial, model);
     }
     RadialCamera camera;
-    camera.width = static_cast<int>(in.take<uint64_t>());
-    camera.height = static_cast<int>(in.take<uint64_t>());
-    camera.focal_px = in.take<double>();
-    camera.cx = in.take<double>() - 0.5;  // COLMAP's pixel centres are at half integers
-    camera.cy = in.take<double>() - 0.5;
-    if (model == kSimpleRadial) camera.k = in.take<double>();
+    camera.width = in.take_side();
+    camera.height = in.take_side();
+    camera.focal_px = in.take_focal();
+    camera.cx = in.take_coordinate() - 0.5;  // COLMAP's pixel centres are at half integers
+    camera.cy = in.take_coordinate() - 0.5;
+    if (model == kSimpleRadial) camera.k = in.take_coordinate();
     cameras[id] = camera;
   }
   return cameras;
@@ -92,10 +119,7 @@ SfmModel read_colmap_model(const std::filesystem::path& folder) try {
   for (uint64_t left = images.take_count(73); left > 0; --left) {
     const auto id = images.take<uint32_t>();
     SfmView view;
-    const auto w = images.take<double>();
-    const Eigen::Vector3d xyz = images.take_vector();
-    view.camera_from_world.rotation =
-        Eigen::Quaterniond(w, xyz.x(), xyz.y(), xyz.z()).normalized().toRotationMatrix();
+    view.camera_from_world.rotation = images.take_rotation().toRotationMatrix();
     view.camera_from_world.translation = images.take_vector();
     const auto camera = cameras.find(images.take<uint32_t>());
     if (camera == cameras.end()) {

@@ -3,6 +3,7 @@
 // trust, the joint reconstruction.
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -131,6 +132,27 @@ TEST(ReadColmapModel, RefusesFilesThatEndEarlyAndOtherCameras) {
   const auto folder = write_model(4, 0);
   EXPECT_THAT(message_of(ErrorCode::kInput, [&] { read_colmap_model(folder); }),
               HasSubstr("SIMPLE_RADIAL"));
+}
+
+// What COLMAP writes when an adjustment diverged is no camera.
+TEST(ReadColmapModel, RefusesNumbersThatAreNoCamera) {
+  const auto expect = [](const char* file, size_t offset, auto value, const char* part) {
+    const auto folder = write_model(2, 0);
+    {
+      std::fstream out(folder / file, std::ios::in | std::ios::out | std::ios::binary);
+      out.seekp(static_cast<std::streamoff>(offset));
+      out.write(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+    EXPECT_THAT(message_of(ErrorCode::kInput, [&] { read_colmap_model(folder); }),
+                ::testing::AllOf(HasSubstr(file), HasSubstr(part)));
+  };
+  expect("images.bin", 12, 0.1, "expected a unit quaternion, found");
+  expect("images.bin", 12, std::nan(""), "expected coordinates from -1e13 to 1e13, found nan");
+  expect("images.bin", 12 + 4 * 8, 1e300, "expected coordinates from -1e13 to 1e13, found 1e+300");
+  expect("cameras.bin", 16, uint64_t{1} << 40, "expected the side of a photo in px");
+  expect("cameras.bin", 16, uint64_t{0}, "expected the side of a photo in px");
+  expect("cameras.bin", 32, -500.0, "expected a focal length above 0, found -500");
+  expect("points3D.bin", 16, std::nan(""), "expected coordinates");
 }
 
 TEST(Undistort, ShowsEveryPointWhereAnIdealCameraWould) {

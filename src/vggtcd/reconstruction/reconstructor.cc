@@ -19,6 +19,14 @@ void append_frame(const Reconstruction& from, int frame, Reconstruction& to) {
 
 }  // namespace
 
+std::vector<int> numbers_in_file(const EpochPhotos& epoch, const std::vector<int>& keyframes) {
+  std::vector<int> numbers = keyframes;
+  for (int& number : numbers) {
+    if (epoch.given) number = epoch.given->number_of_frame(number);
+  }
+  return numbers;
+}
+
 JointReconstruction joint_of_keyframes(const Reconstruction& before, const Reconstruction& after,
                                        int keyframes) {
   check(before.width == after.width && before.height == after.height,

@@ -91,6 +91,9 @@ class PrefixedProgress : public ProgressSink {
   std::string prefix_;
 };
 
+// Keyframes as a prediction file names them: of a given epoch by their numbers in its file.
+std::vector<int> numbers_in_file(const EpochPhotos& epoch, const std::vector<int>& keyframes);
+
 // The joint reconstruction of epochs that are in one frame already: copies of their keyframes.
 JointReconstruction joint_of_keyframes(const Reconstruction& before, const Reconstruction& after,
                                        int keyframes);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -13,6 +14,7 @@
 
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/input_file.h"
+#include "vggtcd/io/quote.h"
 #include "vggtcd/reconstruction/child_process.h"
 #include "vggtcd/reconstruction/match_file.h"
 #include "vggtcd/reconstruction/photo_cameras.h"
@@ -124,6 +126,28 @@ class Colmap {
   fs::path folder_;
 };
 
+// The photo that each view is. COLMAP names what it was given; a wrapper, or another program of
+// that name, may not.
+std::vector<int> number_views(const SfmModel& model, const std::vector<std::string>& names,
+                              const fs::path& from) {
+  std::map<std::string_view, int> unseen;
+  for (size_t i = 0; i < names.size(); ++i) unseen.emplace(names[i], static_cast<int>(i));
+  std::vector<int> numbers;
+  for (const SfmView& view : model.views) {
+    const auto at = unseen.find(view.name);
+    if (at == unseen.end()) {
+      throw_error(
+          ErrorCode::kUnavailable,
+          "colmap: expected each of the {} photos it was given ({}, ...) at most once in its "
+          "model, found {}; is the colmap on the PATH the program itself? See {}",
+          names.size(), names.front(), quote(view.name), from.string());
+    }
+    numbers.push_back(at->second);
+    unseen.erase(at);
+  }
+  return numbers;
+}
+
 // What COLMAP is given: images/, features/, matches.txt and the cameras.
 class Mapper {
  public:
@@ -186,6 +210,7 @@ class Mapper {
       most = views;
       best = models / std::to_string(i);
     }
+    if (best) number_views(read_colmap_model(*best), names_, colmap.log());
     return best;
   }
 
@@ -325,11 +350,7 @@ SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
   result.model = find_model(photos, listed, matches, options, scratch, progress);
   result.pairs = std::move(matches.pairs);
   result.reduced = std::move(photos.images);
-  for (const SfmView& view : result.model.views) {
-    const auto at = std::find(names.begin(), names.end(), view.name);
-    check(at != names.end(), "structure_from_motion: a view is one of the photos");
-    result.photo_of_view.push_back(static_cast<int>(at - names.begin()));
-  }
+  result.photo_of_view = number_views(result.model, names, scratch / "model");
   return result;
 }
 

@@ -12,6 +12,7 @@
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/weight_file.h"
+#include "vggtcd/io/weight_shards.h"
 #include "vggtcd/nn/product_rate.h"
 #include "vggtcd/scene/keyframes.h"
 #include "vggtcd/vggt/memory_plan.h"
@@ -158,12 +159,16 @@ void append_keyframes(const Frames& from, const std::vector<int>& keyframes, Fra
 
 std::string VggtReconstructor::fingerprint() const {
   // The weights by size and time: their contents are gigabytes.
-  std::error_code failed;
-  const auto size = std::filesystem::file_size(options_.weights, failed);
-  const auto time = std::filesystem::last_write_time(options_.weights, failed);
-  return fmt::format("vggt 2; weights {} {} {}; keyframes {}; side {}; precision {}",
-                     absolute_path(options_.weights).string(), failed ? 0 : size,
-                     time.time_since_epoch().count(), options_.keyframes, options_.frame_side_px,
+  std::string weights;
+  for (const std::filesystem::path& file : weight_files(options_.weights)) {
+    std::error_code failed;
+    const auto size = std::filesystem::file_size(file, failed);
+    const auto time = std::filesystem::last_write_time(file, failed);
+    weights += fmt::format("{} {} {}; ", absolute_path(file).string(), failed ? 0 : size,
+                           time.time_since_epoch().count());
+  }
+  return fmt::format("vggt 2; weights {}keyframes {}; side {}; precision {}", weights,
+                     options_.keyframes, options_.frame_side_px,
                      enum_to_string(resolve_precision(options_.network.precision)));
 }
 
@@ -267,6 +272,8 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
     append_keyframes(before, joint.keyframes_t1, keyframes);
     append_keyframes(after, joint.keyframes_t2, keyframes);
     joint.reconstruction = passes.run("joint", keyframes);
+    joint.keyframes_t1 = numbers_in_file(photos.before, joint.keyframes_t1);
+    joint.keyframes_t2 = numbers_in_file(photos.after, joint.keyframes_t2);
     write_joint(folder / kJointFile, joint);
   }
   const auto made = [](const EpochPhotos& of) {

@@ -35,6 +35,13 @@ struct Reconstruction {
   // Where this frame's origin lies in the world of the file that was read; the axes and the unit
   // are the file's. Not zero only where the file's own origin is far away (local_frame.h).
   Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();
+  // Frames that the prediction file has and this has not (nobody knows where they were taken), by
+  // their numbers in the file, ascending. Whoever names a frame by a number means the file's.
+  std::vector<int> left_out{};
+
+  int frames_in_file() const { return num_frames() + static_cast<int>(left_out.size()); }
+  std::optional<int> frame_of_number(int number_in_file) const;  // nothing: left out, or not there
+  int number_of_frame(int frame) const;
 
   int num_frames() const { return static_cast<int>(views.size()); }
   size_t pixels_per_frame() const {
@@ -64,8 +71,11 @@ struct JointReconstruction {
 };
 
 // The frame that shows the photo of this name; or, if no photo is called so, the frame of this
-// number from 0 (a name wins over a number: photos may be named 0, 1, 2 in another order).
+// number in the file from 0 (a name wins over a number: photos may be named 0, 1, 2 anyhow).
 std::optional<int> find_frame(const Reconstruction& reconstruction, std::string_view photo);
+
+// Removes the frames k with remove[k] and notes them in left_out, which must be empty.
+void remove_frames(Reconstruction& reconstruction, const std::vector<bool>& remove);
 
 // Throws Error{kInternal} unless the arrays have the sizes that the header promises. For readers
 // and generators of reconstructions: what they hand over has passed this.
