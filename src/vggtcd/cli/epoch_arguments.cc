@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/io/output_conflict.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -84,6 +85,10 @@ void print_plausibility(const Alignment& alignment) {
   const PlausibilityResult& plausibility = alignment.plausibility;
   if (plausibility.verdict == Plausibility::kBelievable) return;
   fmt::print("Careful: {}.\n", plausibility.explanation);
+}
+
+void EpochArguments::require_out_apart(const std::string& weights) const {
+  require_directory_apart(out, {before, after, joint, initial_sim3, reference, weights});
 }
 
 void EpochArguments::require_none() const {

@@ -4,6 +4,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <new>
 
@@ -80,6 +81,8 @@ int main(int argc, char** argv) {
   // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which
   // adds up to a tenth of the peak.
   mallopt(M_MMAP_THRESHOLD, 4 << 20);
+  // A limit on the size of files (ulimit -f) is a failed write with a reason, not the end.
+  std::signal(SIGXFSZ, SIG_IGN);
   using vggtcd::Error;
   using vggtcd::ErrorCode;
   try {

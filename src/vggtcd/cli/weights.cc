@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "vggtcd/cli/command.h"
+#include "vggtcd/io/output_conflict.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/vggt/checkpoint.h"
@@ -107,6 +108,7 @@ void add_convert(Program& program, CLI::App& parent) {
   CLI::App* command = add_command(
       program, parent, "convert", "Write a weights file as safetensors of another precision.",
       [arguments](ProgressSink& progress) {
+        require_file_apart(arguments->to, {arguments->from});
         convert_weights(arguments->from, arguments->to, arguments->options, progress);
         fmt::print("{}\n", arguments->to);
       });

@@ -14,6 +14,7 @@
 #include "vggtcd/evaluation/synthetic/scene.h"
 #include "vggtcd/evaluation/wat.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/output_directory.h"
 
 namespace vggtcd {
 namespace {
@@ -71,19 +72,12 @@ SceneOutcome resume_or_run(const fs::path& file, const Json& options,
           fmt::format("{}: not usable, computed again ({})", file.string(), error.what()));
     }
   }
+  OutputDirectory kept(file.parent_path(), {kCacheKind, {file.filename().string()}, true, true});
   SceneOutcome outcome = run();
-  write_json_file(file, Json{{"options", options}, {"outcome", to_json(outcome)}});
+  write_json_file(kept / file.filename().string(),
+                  Json{{"options", options}, {"outcome", to_json(outcome)}});
+  kept.commit();
   return outcome;
-}
-
-void make_output(const fs::path& out) {
-  for (const char* folder : {"scenes", "rivals"}) {
-    std::error_code error;
-    fs::create_directories(out / folder, error);
-    if (error) {
-      throw_error(ErrorCode::kOutput, "{}: cannot be created ({})", out.string(), error.message());
-    }
-  }
 }
 
 }  // namespace
@@ -95,7 +89,7 @@ std::vector<SceneOutcome> run_synthetic_suite(const fs::path& out, const Benchma
   const std::vector<std::string> scenes =
       options.scenes == "all" ? names(scene_names())
                               : chosen_scenes(options.scenes, names(all_scene_names()));
-  make_output(out);
+  claim_report(out);
   for (const std::string& scene : scenes) {
     for (const uint64_t seed : parse_seeds(options.seeds)) {
       const fs::path file = out / "scenes" / fmt::format("{}_{}.json", scene, seed);
@@ -116,7 +110,7 @@ std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& dat
   options.validate();
   SuiteReport report{"wat", options, {}};
   const std::vector<std::string> scenes = chosen_scenes(options.scenes, list_wat_scenes(data));
-  make_output(out);
+  claim_report(out);
   Json key = fingerprint(options);
   key["data"] = fs::absolute(data).lexically_normal().string();
   key["predictions"] = fs::absolute(predictions.directory).lexically_normal().string();

@@ -53,9 +53,10 @@ void require_colmap();
 // thread (its results depend on the number of threads). Cameras are SIMPLE_RADIAL, one for each
 // epoch and photo size; their focal lengths start at 1.2 and, where that leaves photos out, at 0.85
 // times the longer side. Known ones are SIMPLE_PINHOLE and start as they are. Chosen is the model
-// with most photos. `scratch` keeps the two stages, matches.npz and model/; what an earlier call
-// with the same photos and options left there is used. Throws Error{kUnavailable} without COLMAP; a
-// model without views if none was found.
+// with most photos; it is without views if the photos gave none. `scratch` keeps the two stages
+// (io/kept_files.h), matches.npz and model/ or no_model; what an earlier call with the same photos
+// and options left there is used. Throws Error{kUnavailable} without COLMAP, and if COLMAP was
+// ended or failed for another reason than the photos: nothing of that is kept.
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const std::filesystem::path& scratch, ProgressSink& progress);
 

@@ -8,6 +8,7 @@
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/kept_files.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/scene/keyframes.h"
@@ -224,20 +225,22 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
   Passes passes(options_, progress);
   const auto epoch = [&](const char* name, const char* file, const EpochPhotos& of,
                          const Frames& frames) {
-    if (of.given || std::filesystem::exists(folder / file)) return;
+    if (of.given || is_kept(folder, file)) return;
     write_reconstruction(folder / file, passes.run(name, frames));
+    keep(folder, file);
   };
   epoch("before", kBeforeFile, photos.before, before);
   epoch("after", kAfterFile, photos.after, after);
   JointReconstruction joint;
   joint.keyframes_t1 = select_keyframes(static_cast<int>(before.images.size()), options_.keyframes);
   joint.keyframes_t2 = select_keyframes(static_cast<int>(after.images.size()), options_.keyframes);
-  if (!std::filesystem::exists(folder / kJointFile)) {
+  if (!is_kept(folder, kJointFile)) {
     Frames keyframes;
     append_keyframes(before, joint.keyframes_t1, keyframes);
     append_keyframes(after, joint.keyframes_t2, keyframes);
     joint.reconstruction = passes.run("joint", keyframes);
     write_joint(folder / kJointFile, joint);
+    keep(folder, kJointFile);
   }
   const auto made = [](const EpochPhotos& of) {
     return fmt::format("{} {}", of.photos.size(), of.given ? "given frames" : "photos");
