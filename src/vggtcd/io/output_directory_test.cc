@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/ptrace.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -370,6 +371,85 @@ TEST(OutputDirectory, LeavesAloneWhatALivingProcessWritesAndWhatSomebodyPutThere
   { const OutputDirectory other(directory / "out", contents()); }
   EXPECT_TRUE(fs::exists(living.path()));
   EXPECT_EQ(file_bytes(stale / "my notes.txt"), "precious");
+}
+
+// Runs write_results in a process that is killed when it enters its n-th system call; whether it was.
+bool killed_at_call(int n, const fs::path& target, std::string_view text) {
+  const pid_t child = fork();
+  if (child == 0) {
+    ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
+    raise(SIGSTOP);
+    write_results(target, text);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  for (int stops = 0; WIFSTOPPED(status); ++stops) {
+    if (stops == 2 * n - 1) {  // it stops when it enters a call and when it leaves it
+      kill(child, SIGKILL);
+    } else {
+      ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
+    }
+    waitpid(child, &status, 0);
+  }
+  return WIFSIGNALED(status);
+}
+
+bool can_trace() {
+  const pid_t child = fork();
+  if (child == 0) _exit(ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) == 0 ? 0 : 1);
+  int status = 0;
+  waitpid(child, &status, 0);
+  return status == 0;
+}
+
+TEST(OutputDirectory, AKillAtAnySystemCallLosesNothingAndTheNextRunPutsAllRight) {
+  if (!can_trace()) GTEST_SKIP() << "no process may be traced here";
+  int calls = 0;
+  for (bool was_killed = true; was_killed;) {
+    const TemporaryDirectory directory;
+    const fs::path out = directory / "out";
+    write_results(out, "one");
+    write_bytes(out / "notes.txt", "of the user");
+    write_bytes(out / "overlays/before/mine.txt", "of the user");
+    was_killed = killed_at_call(++calls, out, "two");
+    ASSERT_EQ(file_bytes(out / "notes.txt"), "of the user") << calls;
+    ASSERT_EQ(file_bytes(out / "overlays/before/mine.txt"), "of the user") << calls;
+    // The first name is put in place last: where it is, all is of one run.
+    if (fs::exists(out / "a.txt")) {
+      ASSERT_EQ(file_bytes(out / "a.txt"), file_bytes(out / "overlays/before/b.txt")) << calls;
+    }
+    write_results(out, "three");
+    ASSERT_EQ(file_bytes(out / "a.txt"), "three") << calls;
+    ASSERT_EQ(file_bytes(out / "overlays/before/b.txt"), "three") << calls;
+    ASSERT_EQ(entries(out), (Names{"a.txt", "notes.txt", "overlays"})) << calls;
+    ASSERT_EQ(entries(out / "overlays/before"), (Names{"b.txt", "mine.txt"})) << calls;
+    ASSERT_EQ(hidden(out), 1u) << calls;
+    ASSERT_EQ(directory.num_files(), 1u) << calls;
+  }
+  EXPECT_GT(calls, 50);
+}
+
+TEST(OutputDirectory, AKillAtAnySystemCallLeavesANewDirectoryCompleteOrNotThere) {
+  if (!can_trace()) GTEST_SKIP() << "no process may be traced here";
+  int calls = 0;
+  for (bool was_killed = true; was_killed;) {
+    const TemporaryDirectory directory;
+    const fs::path out = directory / "out";
+    was_killed = killed_at_call(++calls, out, "one");
+    if (fs::exists(out)) {
+      ASSERT_EQ(file_bytes(out / "a.txt"), "one") << calls;
+      ASSERT_EQ(file_bytes(out / "overlays/before/b.txt"), "one") << calls;
+    }
+    write_results(out, "two");
+    ASSERT_EQ(file_bytes(out / "a.txt"), "two") << calls;
+    ASSERT_EQ(hidden(out), 1u) << calls;
+    // A directory that does not say yet whose it is stays: an empty one, for the length of one call.
+    for (const std::string& name : entries(directory.path())) {
+      if (name != "out") ASSERT_TRUE(fs::is_empty(directory / name)) << calls;
+    }
+  }
+  EXPECT_GT(calls, 50);
 }
 
 // What a process that is killed within commit() leaves: the list knows old and new files.
