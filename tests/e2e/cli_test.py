@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import re
+import resource
 import shutil
 import signal
 import struct
@@ -312,6 +313,107 @@ class Detect(unittest.TestCase):
             self.assertEqual(list(small.iterdir()), [])
         finally:
             subprocess.run(["umount", small], check=True)
+
+    # --- what the program did not write stays ---
+
+    def tree(self, root):
+        return {str(p.relative_to(root)): p.read_bytes() for p in root.rglob("*") if p.is_file()}
+
+    def refused(self, words, *arguments):
+        before = self.tree(self.root)
+        done = run(*arguments, "--progress", "plain")
+        self.assertEqual(done.returncode, 6, done.stderr)
+        self.assertIn(words, done.stderr)
+        self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)  # no stage was run
+        self.assertEqual(self.tree(self.root), before)
+
+    def test_an_output_that_stands_on_an_input_is_refused_before_any_work(self):
+        site = self.root / "site"
+        shutil.copytree(self.out, site)
+        for name in ("t1.npz", "t2.npz", "joint.npz"):
+            shutil.copy(EXAMPLE / name, site / name)
+        t1, t2, joint = (site / name for name in ("t1.npz", "t2.npz", "joint.npz"))
+        far = [EXAMPLE / "t1.npz", EXAMPLE / "t2.npz"]
+        for command in ("detect", "register"):
+            self.refused("it holds the input", command, t1, EXAMPLE / "t2.npz", "--joint", EXAMPLE / "joint.npz", "-o", site)
+            self.refused("it holds the input", command, *far, "--joint", joint, "-o", site)
+            self.refused("it holds the input", command, *far, "--initial-sim3", site / "sim3.json", "-o", site)
+            self.refused("it holds the input", command, *far, "--joint", EXAMPLE / "joint.npz", "--reference",
+                         site / "colmap", "-o", site)
+        self.refused("it holds the input", "detect", *far, "--joint", joint, "--dry-run", "-o", site)
+        photos = self.root / "photos_apart"
+        photos.mkdir()
+        for name in ("a.jpg", "b.jpg"):
+            (photos / name).write_bytes(b"not read")
+        self.refused("it lies in the input", "detect", photos, t2, "-o", photos / "out")
+        self.refused("it is the input", "detect", photos, t2, "-o", photos)
+        self.refused("it lies in the input", "benchmark", "--suite", "wat", "--data", photos, "--predictions", site, "-o",
+                     photos / "out")
+        self.refused("it holds the input", "benchmark", "--suite", "wat", "--data", photos, "--predictions", t1, "-o", site)
+        weights = self.root / "weights.safetensors"
+        weights.write_bytes(b"not read")
+        self.refused("it is the input", "weights", "convert", weights, "-o", weights)
+        self.refused("it is the input", "reconstruct", t1, "-o", t1)
+        self.refused("it is the input", "reconstruct", photos / "*.jpg", "-o", photos / "a.jpg")
+        self.refused("it lies in the input", "reconstruct", photos, "-o", photos / "a.jpg")
+        self.refused("it is the input", "reconstruct", t1, "--weights", weights, "-o", weights)
+        tum = site / "cameras_before.tum"
+        self.refused("it is the input", "evaluate", tum, tum, "--truth-before", tum, "--truth-after", tum, "-o", tum)
+        self.refused("it is one of the results", "evaluate", "--change", site, "--truth", EXAMPLE / "truth.npz", "-o",
+                     site / "summary.json")
+        self.refused("it is one of the results", "view", site, "-o", site / "after.ply")
+
+    def test_foreign_files_stay_and_what_stands_in_the_way_is_named(self):
+        site = self.root / "foreign"
+        shutil.copytree(self.out, site)
+        (site / "notes.txt").write_text("2.40 m")
+        (site / "overlays" / "before" / "mine.png").write_text("drawn")
+        done = run(*self.inputs, "--method", "coarse", "--no-page", "-o", site)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((site / "notes.txt").read_text(), "2.40 m")
+        self.assertEqual((site / "overlays" / "before" / "mine.png").read_text(), "drawn")
+        self.assertFalse((site / "report.html").exists())  # of the first run, and not of this one
+        with open(site / "after.ply", "ab") as cloud:
+            cloud.write(b"edited")
+        self.refused("after.ply: stands where results go, and is not as vggt-cd wrote it there; move it away",
+                     *self.inputs, "-o", site)
+        self.refused('it holds what vggt-cd lists there as "results", expected "scene"', "synthesize", site, "--frames", "3")
+
+    def test_view_replaces_its_own_page_only(self):
+        site = self.root / "viewed"
+        shutil.copytree(self.out, site)
+        done = run("view", site, "--max-points", "1000")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertNotEqual((site / "report.html").read_bytes(), (self.out / "report.html").read_bytes())
+        self.assertEqual(run(*self.arguments, "-o", site).returncode, 0)  # the page is still one of the results
+        (site / "report.html").write_text("mine")
+        self.refused("report.html: stands where results go", "view", site)
+        self.assertEqual(run("view", site, "-o", site / "small.html").returncode, 0)
+
+    def test_out_is_a_link_to_nowhere_or_a_mount_point(self):
+        link = self.root / "dangling"
+        link.symlink_to("made/later")
+        self.assertEqual(run(*self.arguments, "--no-page", "-o", link).returncode, 0)
+        self.assertTrue((self.root / "made" / "later" / "summary.json").exists())
+        self.assertTrue(link.is_symlink())
+        unshare = ["unshare", "--mount", "--propagation", "private", *([] if os.geteuid() == 0 else ["--user", "--map-root-user"])]
+        mounted = self.root / "mounted"
+        mounted.mkdir()
+        script = 'mount -t tmpfs -o size=100m none "$0" || exit 77; "$@" || exit $?; ls "$0"'
+        done = subprocess.run([*unshare, "sh", "-c", script, mounted, PROGRAM, *map(str, self.arguments), "--no-page", "-o",
+                               mounted], capture_output=True, text=True, timeout=300)
+        if done.returncode in (1, 77) and "vggt-cd" not in done.stderr:
+            self.skipTest("cannot mount a small file system")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("summary.json", done.stdout)
+
+    def test_a_limit_on_the_size_of_files_is_an_output_error(self):
+        out = self.root / "limited"
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100 << 10, resource.RLIM_INFINITY))
+        done = run(*self.arguments, "-o", out, preexec_fn=limit)
+        self.assertEqual(done.returncode, 6, done.stderr)
+        self.assertIn("File too large", done.stderr)
+        self.assertEqual([p.name for p in self.root.iterdir() if "limited" in p.name], [])
 
     def test_interrupt_leaves_nothing(self):
         out = self.root / "interrupted"

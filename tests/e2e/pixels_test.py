@@ -173,6 +173,51 @@ class Pixels(unittest.TestCase):
         self.assertNotIn("matching", done.stderr)
         self.assertEqual(content(out), content(self.out))
 
+    def test_what_the_machine_did_to_colmap_is_said_and_not_kept(self):
+        """A mapper that is killed, as the kernel does when memory is short; then one that fails with a full disk."""
+        out, real, tools = self.root / "mapper", shutil.which("colmap"), self.root / "tools"
+        tools.mkdir()
+        script = tools / "colmap"
+        for end, words in (("kill -9 $$", "colmap mapper: expected exit status 0, found it was ended by signal 9"),
+                           ("echo disk full; exit 1", "colmap mapper: expected exit status 0, found exit status 1"),
+                           ("exit 137", "found exit status 137 (of a script: signal 9, Killed)")):
+            script.write_text(f'#!/bin/sh\n[ "$1" = mapper ] && {{ {end}; }}\nexec {real} "$@"\n')
+            script.chmod(0o755)
+            done = subprocess.run([PROGRAM, *map(str, ["detect", *self.photos, "-o", out, *SIZE])], capture_output=True,
+                                  text=True, timeout=500, env={**ENVIRONMENT, "PATH": f"{tools}:{os.environ['PATH']}"})
+            self.assertEqual(done.returncode, 8, done.stderr)
+            self.assertIn(words, done.stderr)
+            self.assertIn("run it again", done.stderr)
+        done = must("detect", *self.photos, "-o", out, *SIZE, "--progress", "plain")
+        self.assertNotIn("matching", done.stderr)  # the finished stages are used
+        self.assertEqual(content(out), content(self.out))
+
+    def test_damaged_stages_are_made_again(self):
+        out = self.root / "damaged"
+        shutil.copytree(self.out, out)
+        kept = next((out / ".stages").glob("classical-*"))
+        for name in ("before.npz", "joint.npz", "reconstruction.json", ".kept"):
+            data = bytearray((kept / name).read_bytes())
+            if name == "joint.npz":
+                data[len(data) // 2] ^= 1  # as long, another byte
+            else:
+                del data[len(data) // 2:]
+            (kept / name).write_bytes(data)
+            done = must("detect", *self.photos, "-o", out, *SIZE, "--progress", "plain")
+            self.assertIn(f"{name}: is damaged and made again", done.stderr)
+            self.assertEqual(content(out), content(self.out))
+
+    def test_photos_in_out_are_refused_before_any_work(self):
+        """OUT was written by synthesize: its photos are in its list, and are the input."""
+        scene = self.root / "in_out"
+        shutil.copytree(self.scene, scene)
+        before = content(scene)
+        for arguments in ((), ("--dry-run",)):
+            done = run("detect", scene / "before", scene / "after", "-o", scene, *SIZE, *arguments)
+            self.assertEqual(done.returncode, 6, done.stderr)
+            self.assertIn(f"it holds the input {scene / 'before'}; name another directory, outside of it", done.stderr)
+            self.assertEqual(content(scene), before)
+
     def test_a_video_before_and_a_folder_after(self):
         video = self.root / "before.avi"
         made = subprocess.run([TEST_MEDIA, "video", video, *sorted(self.photos[0].iterdir())])

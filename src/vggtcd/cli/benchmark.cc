@@ -11,6 +11,7 @@
 #include "vggtcd/evaluation/benchmark_report.h"
 #include "vggtcd/evaluation/wat.h"
 #include "vggtcd/io/file_system.h"
+#include "vggtcd/io/output_conflict.h"
 #include "vggtcd/io/photo_source.h"
 #include "vggtcd/pipeline/predict_epochs.h"
 
@@ -73,6 +74,8 @@ WatPredictions wat_predictions(const Arguments& arguments, ProgressSink& progres
 }
 
 void run(const Arguments& arguments, ProgressSink& progress) {
+  require_directory_apart(arguments.out,
+                          {arguments.data, arguments.predictions, arguments.weights});
   std::vector<SceneOutcome> scenes;
   if (arguments.suite == "synthetic") {
     scenes = run_synthetic_suite(arguments.out, arguments.options, progress);

@@ -39,6 +39,7 @@ void add_detect(Program& program) {
     const EpochArguments& epochs = arguments->epochs;
     EpochInputs inputs;
     ReconstructedPhotos photos;
+    epochs.require_out_apart(find_weights(arguments->photos.reconstruction.weights));
     if (names_photos(epochs.before) || names_photos(epochs.after)) {
       arguments->options.validate();
       const MetricInputs metric = epochs.metric();
@@ -57,7 +58,7 @@ void add_detect(Program& program) {
     } else {
       inputs = epochs.inputs();
       if (arguments->dry_run) {
-        print_answer("{}", describe_plan(inputs, arguments->options));
+        print_answer("{}", describe_plan(inputs, arguments->options, epochs.out));
         return;
       }
     }

@@ -6,6 +6,7 @@
 
 #include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/io/output_conflict.h"
 
 namespace vggtcd::cli {
 namespace {
@@ -85,6 +86,10 @@ void print_plausibility(const Alignment& alignment) {
   const PlausibilityResult& plausibility = alignment.plausibility;
   if (plausibility.verdict == Plausibility::kBelievable) return;
   print_answer("Careful: {}.\n", plausibility.explanation);
+}
+
+void EpochArguments::require_out_apart(const std::string& weights) const {
+  require_directory_apart(out, {before, after, joint, initial_sim3, reference, weights});
 }
 
 void EpochArguments::require_none() const {

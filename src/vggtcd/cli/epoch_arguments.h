@@ -22,6 +22,9 @@ struct EpochArguments {
   EpochInputs inputs() const;
   // Throws Error{kUsage}.
   MetricInputs metric() const;
+  // Before any work: throws Error{kOutput} if OUT stands on one of the inputs
+  // (io/output_conflict.h). `weights`: of the network, or empty.
+  void require_out_apart(const std::string& weights = "") const;
   // For photos, which need none of them: throws Error{kUsage} if one was given.
   void require_none() const;
 };

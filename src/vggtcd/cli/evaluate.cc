@@ -9,6 +9,7 @@
 #include "vggtcd/evaluation/pose_pairs.h"
 #include "vggtcd/evaluation/results_scores.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/output_conflict.h"
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/io/trajectory.h"
 
@@ -145,6 +146,10 @@ void run_change(const Arguments& arguments) {
 }
 
 void run(const Arguments& arguments, ProgressSink& progress) {
+  require_file_apart(arguments.out,
+                     {arguments.before, arguments.after, arguments.truth, arguments.truth_before,
+                      arguments.truth_after, arguments.sim3});
+  if (!arguments.change.empty()) require_no_result(arguments.out, arguments.change);
   if (!arguments.change.empty()) return run_change(arguments);
   if (arguments.before.empty() || arguments.after.empty()) {
     throw_error(ErrorCode::kUsage,

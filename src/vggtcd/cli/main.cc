@@ -66,7 +66,10 @@ void prepare_process() {
   // It was for us, not for programs that we start.
   const char* blas = std::getenv(kBlasVariable.data());
   if (blas == g_no_blas_threads + kBlasVariable.size() + 1) unsetenv(kBlasVariable.data());
-  std::signal(SIGPIPE, SIG_IGN);  // the write fails instead, and what was begun is cleaned up
+  // The write fails instead, with a reason, and what was begun is cleaned up: a reader that is gone,
+  // a limit on the size of files (ulimit -f).
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which
   // adds up to a tenth of the peak.
   mallopt(M_MMAP_THRESHOLD, 4 << 20);

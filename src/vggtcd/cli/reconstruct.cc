@@ -7,6 +7,7 @@
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/output_conflict.h"
 #include "vggtcd/io/output_file.h"
 #include "vggtcd/io/photo_source.h"
 #include "vggtcd/io/quote.h"
@@ -42,6 +43,9 @@ ImageBatch load_input(const Arguments& arguments, ProgressSink& progress) {
 }
 
 void reconstruct(const Arguments& arguments, ProgressSink& progress) {
+  std::vector<std::string> inputs = {find_weights(arguments.weights)};
+  for (const fs::path& source : arguments.photos) inputs.push_back(source.string());
+  require_file_apart(arguments.output, inputs);
   // What can be known to fail fails now, not after the network has run for an hour.
   { const OutputFile probe(arguments.output); }
   const fs::path weights = require_weights(arguments.weights);

@@ -31,6 +31,7 @@ void add_register(Program& program) {
               "OUT/sim3.json has the alignment",
               quote(epoch));
         }
+        arguments->epochs.require_out_apart();
         const auto [alignment, metric] =
             register_epochs(arguments->epochs.inputs(), arguments->options,
                             arguments->authors_layout, arguments->epochs.out, progress);

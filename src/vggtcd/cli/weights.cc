@@ -7,6 +7,7 @@
 
 #include "vggtcd/cli/command.h"
 #include "vggtcd/cli/standard_streams.h"
+#include "vggtcd/io/output_conflict.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/vggt/checkpoint.h"
@@ -113,6 +114,7 @@ void add_convert(Program& program, CLI::App& parent) {
   CLI::App* command = add_command(
       program, parent, "convert", "Write a weights file as safetensors of another precision.",
       [arguments](ProgressSink& progress) {
+        require_file_apart(arguments->to, {arguments->from});
         convert_weights(arguments->from, arguments->to, arguments->options, progress);
          print_answer("{}\n", escaped(arguments->to));
       });

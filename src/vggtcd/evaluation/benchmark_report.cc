@@ -14,6 +14,7 @@
 #include "vggtcd/evaluation/change_tables.h"
 #include "vggtcd/evaluation/paper_numbers.h"
 #include "vggtcd/evaluation/registration_methods.h"
+#include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/output_file.h"
 
 namespace vggtcd {
@@ -215,6 +216,10 @@ std::string failures(const SuiteReport& report) {
   return out;
 }
 
+const OutputContents kReport{"benchmark",
+                             {"benchmark.json", "benchmark.md", "benchmark.csv", "trajectories.svg",
+                              "ablation.csv", "ablation.svg", "change.csv", "instances.csv"}};
+
 }  // namespace
 
 std::string report_markdown(const SuiteReport& report) {
@@ -278,30 +283,36 @@ std::string ablation_csv(const SuiteReport& report) {
   return out;
 }
 
+void claim_report(const std::filesystem::path& directory) {
+  OutputDirectory::claim(directory, kReport);
+}
+
 void write_report(const std::filesystem::path& directory, const SuiteReport& report) {
+  OutputDirectory out(directory, kReport);
   Json json{{"suite", report.suite},
             {"version", kVersion},
             {"options", options_to_json(report.options)},
             {"scenes", Json::array()}};
   for (const SceneOutcome& scene : report.scenes) json["scenes"].push_back(to_json(scene));
-  write_json_file(directory / "benchmark.json", json);
-  write_text_file(directory / "benchmark.md", report_markdown(report));
-  write_text_file(directory / "benchmark.csv", registration_csv(report));
-  write_text_file(directory / "trajectories.svg", trajectories_svg(report));
+  write_json_file(out / "benchmark.json", json);
+  write_text_file(out / "benchmark.md", report_markdown(report));
+  write_text_file(out / "benchmark.csv", registration_csv(report));
+  write_text_file(out / "trajectories.svg", trajectories_svg(report));
   const auto any = [&](auto member) {
     return std::any_of(report.scenes.begin(), report.scenes.end(),
                        [&](const SceneOutcome& scene) { return !(scene.*member).empty(); });
   };
   if (any(&SceneOutcome::ablation)) {
-    write_text_file(directory / "ablation.csv", ablation_csv(report));
-    write_text_file(directory / "ablation.svg", ablation_svg(report));
+    write_text_file(out / "ablation.csv", ablation_csv(report));
+    write_text_file(out / "ablation.svg", ablation_svg(report));
   }
   if (any(&SceneOutcome::changes)) {
-    write_text_file(directory / "change.csv", change_csv(report.scenes));
+    write_text_file(out / "change.csv", change_csv(report.scenes));
   }
   if (any(&SceneOutcome::instances)) {
-    write_text_file(directory / "instances.csv", instance_csv(report.scenes));
+    write_text_file(out / "instances.csv", instance_csv(report.scenes));
   }
+  out.commit();
 }
 
 }  // namespace vggtcd

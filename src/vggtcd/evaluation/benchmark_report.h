@@ -25,6 +25,10 @@ std::string trajectories_svg(const SuiteReport& report);
 // ATE over the number of keyframes, coarse and with the fine stage, mean of all scenes.
 std::string ablation_svg(const SuiteReport& report);
 
+// Makes the directory; throws Error{kOutput} if reports could not be written there later
+// (io/output_directory.h).
+void claim_report(const std::filesystem::path& directory);
+
 // Writes all of them. Throws Error{kOutput}.
 void write_report(const std::filesystem::path& directory, const SuiteReport& report);
 

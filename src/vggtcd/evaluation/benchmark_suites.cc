@@ -15,6 +15,7 @@
 #include "vggtcd/evaluation/wat.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/output_directory.h"
 
 namespace vggtcd {
 namespace {
@@ -77,15 +78,12 @@ SceneOutcome resume_or_run(const fs::path& file, const Json& options,
       not_usable(error.what());
     }
   }
+  OutputDirectory kept(file.parent_path(), {kCacheKind, {file.filename().string()}, true, true});
   SceneOutcome outcome = run();
-  write_json_file(file, Json{{"options", options}, {"outcome", to_json(outcome)}});
+  write_json_file(kept / file.filename().string(),
+                  Json{{"options", options}, {"outcome", to_json(outcome)}});
+  kept.commit();
   return outcome;
-}
-
-void make_output(const fs::path& out) {
-  for (const char* folder : {"scenes", "rivals"}) {
-    make_folder(out / folder);
-  }
 }
 
 }  // namespace
@@ -97,7 +95,7 @@ std::vector<SceneOutcome> run_synthetic_suite(const fs::path& out, const Benchma
   const std::vector<std::string> scenes =
       options.scenes == "all" ? names(scene_names())
                               : chosen_scenes(options.scenes, names(all_scene_names()));
-  make_output(out);
+  claim_report(out);
   for (const std::string& scene : scenes) {
     for (const uint64_t seed : parse_seeds(options.seeds)) {
       const fs::path file = out / "scenes" / fmt::format("{}_{}.json", scene, seed);
@@ -118,7 +116,7 @@ std::vector<SceneOutcome> run_wat_suite(const fs::path& out, const fs::path& dat
   options.validate();
   SuiteReport report{"wat", options, {}};
   const std::vector<std::string> scenes = chosen_scenes(options.scenes, list_wat_scenes(data));
-  make_output(out);
+  claim_report(out);
   Json key = fingerprint(options);
   key["data"] = absolute_path(data).lexically_normal().string();
   key["predictions"] = absolute_path(predictions.directory).lexically_normal().string();

@@ -138,14 +138,26 @@ TEST_F(Slice, FinishedScenesAreNotComputedAgain) {
 TEST(SyntheticSuite, ComputesAMutilatedResultAgain) {
   const TemporaryDirectory temporary;
   const fs::path& directory = temporary.path();
-  fs::create_directories(directory / "scenes");
-  write_bytes(directory / "scenes" / "desk_11.json", "{\"options\": {}, \"outc");
   BenchmarkOptions options = slice();
   options.scenes = "desk";
   options.ablation = false;
   options.frames = 4;
   options.width = 48;
   EXPECT_EQ(run_synthetic_suite(directory, options, silent_progress()).size(), 1u);
+  const std::string whole = file_bytes(directory / "scenes" / "desk_11.json");
+  write_bytes(directory / "scenes" / "desk_11.json", whole.substr(0, whole.size() / 2));
+  EXPECT_EQ(run_synthetic_suite(directory, options, silent_progress()).size(), 1u);
+  EXPECT_GT(file_bytes(directory / "scenes" / "desk_11.json").size(), whole.size() / 2);
+}
+
+TEST(SyntheticSuite, ReplacesNoReportThatItDidNotWrite) {
+  const TemporaryDirectory temporary;
+  write_bytes(temporary / ".vggt-cd-results", "");
+  write_bytes(temporary / "change.csv", "my own table");
+  EXPECT_ERROR(run_synthetic_suite(temporary.path(), slice(), silent_progress()),
+               ErrorCode::kOutput, "change.csv: stands where results go");
+  EXPECT_EQ(file_bytes(temporary / "change.csv"), "my own table");
+  EXPECT_EQ(temporary.num_files(), 2u);
 }
 
 TEST_F(Slice, ReportHasEveryTableAndPlot) {

@@ -10,6 +10,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/sim3_file.h"
 
 namespace vggtcd {
@@ -82,10 +83,13 @@ MethodAnswer run_or_recall(const RegistrationMethod& method, const RegistrationP
       if (error.code() != ErrorCode::kInput) throw;
     }
   }
+  OutputDirectory kept(directory, {kCacheKind, {file.filename().string()}, true, true});
   const MethodAnswer answer = run(method, problem);
-  write_json_file(file, Json{{"failure", answer.failure},
-                             {"seconds", answer.seconds},
-                             {"t2_from_t1", sim3_to_json(answer.t2_from_t1)}});
+  write_json_file(kept / file.filename().string(),
+                  Json{{"failure", answer.failure},
+                       {"seconds", answer.seconds},
+                       {"t2_from_t1", sim3_to_json(answer.t2_from_t1)}});
+  kept.commit();
   return answer;
 }
 

@@ -57,7 +57,7 @@ TEST_F(KeptRivals, OtherPointsAreAnotherQuestion) {
   Reconstruction recoloured = near_;
   recoloured.color[2] = 4;
   EXPECT_EQ(ask({recoloured, far_, joint_}).t2_from_t1.scale, 4);
-  EXPECT_EQ(directory_.num_files(), 4u);
+  EXPECT_EQ(directory_.num_files(), 4u + 1u);  // and their list
 }
 
 TEST_F(KeptRivals, NoAnswerIsKeptToo) {
@@ -71,10 +71,24 @@ TEST_F(KeptRivals, NoAnswerIsKeptToo) {
 TEST_F(KeptRivals, AMutilatedAnswerIsComputedAgain) {
   ask({near_, far_, joint_});
   for (const auto& file : std::filesystem::directory_iterator(directory_.path())) {
-    write_bytes(file.path(), "{\"failure\": \"\"");
+    if (file.path().extension() == ".json") write_bytes(file.path(), "{\"failure\": \"\"");
   }
   EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 2);
   EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 2);
+}
+
+TEST_F(KeptRivals, AFileOfSomebodyElseIsNotReplaced) {
+  ask({near_, far_, joint_});
+  std::filesystem::path answer;
+  for (const auto& file : std::filesystem::directory_iterator(directory_.path())) {
+    if (file.path().extension() == ".json") answer = file.path();
+  }
+  std::filesystem::remove(directory_ / ".vggt-cd-results");
+  write_bytes(directory_ / ".vggt-cd-results", "");
+  write_bytes(answer, "notes");
+  EXPECT_ERROR(ask({near_, far_, joint_}), ErrorCode::kOutput, "stands where results go");
+  EXPECT_EQ(file_bytes(answer), "notes");
+  EXPECT_EQ(calls_, 1);  // said before the work
 }
 
 TEST_F(KeptRivals, WithoutADirectoryNothingIsKept) {

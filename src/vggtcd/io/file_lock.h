@@ -11,8 +11,9 @@ namespace vggtcd {
 class FileLock {
  public:
   enum class IfMissing { kCreate, kGiveUp };
-  // Locks the file, without waiting. Nothing if somebody else holds it (this process included) or
-  // if it cannot be opened.
+  // Locks the file, without waiting. Nothing, with errno, if somebody else holds it (this process
+  // included; EWOULDBLOCK) or if it cannot be opened or locked. What is locked is the file that
+  // has that name now, not one that was removed or replaced meanwhile.
   static std::optional<FileLock> try_lock(const std::filesystem::path& path,
                                           IfMissing missing = IfMissing::kCreate);
   ~FileLock();

@@ -346,7 +346,7 @@ TEST(NpzWriter, FailureIsAnOutputErrorAndLeavesNothing) {
     writer.finish();
   };
   EXPECT_ERROR(write(directory / "no/such/a.npz"), ErrorCode::kOutput, "a.npz: cannot be written");
-  EXPECT_ERROR(write(directory.path()), ErrorCode::kOutput, "is a directory");
+  EXPECT_ERROR(write(directory.path()), ErrorCode::kOutput, "Is a directory");
   {
     NpzWriter never_finished(directory / "b.npz");
     never_finished.add<float>("x", {4}, values);

@@ -11,6 +11,7 @@
 #include "vggtcd/core/interrupt.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/npz.h"
+#include "vggtcd/io/output_file.h"
 #include "vggtcd/io/quote.h"
 
 namespace vggtcd {
@@ -243,9 +244,9 @@ void NpzWriter::finish() {
   const auto fail = [&](std::string_view reason) {
     throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", path_.string(), reason);
   };
-  if (is_folder(path_)) fail("is a directory");
+  const std::filesystem::path target = output_file_target(path_);
   int open_error = 0;
-  zip_t* zip = zip_open(path_.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &open_error);
+  zip_t* zip = zip_open(target.c_str(), ZIP_CREATE | ZIP_TRUNCATE, &open_error);
   if (zip == nullptr) {
     zip_error_t error;
     zip_error_init_with_code(&error, open_error);

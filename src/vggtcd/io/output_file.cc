@@ -2,6 +2,8 @@
 // OutputFile: stdio with every return value looked at.
 #include "vggtcd/io/output_file.h"
 
+#include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -9,7 +11,7 @@
 #include <new>
 
 #include "vggtcd/core/error.h"
-#include "vggtcd/io/file_system.h"
+#include "vggtcd/io/output_path.h"
 
 namespace vggtcd {
 namespace {
@@ -19,27 +21,27 @@ namespace {
   throw_error(ErrorCode::kOutput, "{}: cannot be written: {}", path.string(), std::strerror(error));
 }
 
-// A long name is cut, because the suffix must fit into a name too; its hash tells it from others.
-std::string aside_name(const std::string& name) {
-  constexpr size_t kMaxBytes = 220;
-  if (name.size() <= kMaxBytes) return fmt::format("{}.partial-{}", name, getpid());
-  return fmt::format("{}.{:x}.partial-{}", name.substr(0, 180), std::hash<std::string>{}(name),
-                     getpid());
-}
-
 }  // namespace
 
+std::filesystem::path output_file_target(const std::filesystem::path& path) {
+  std::filesystem::path target = resolve_output(path);
+  struct stat status = {};
+  if (stat(target.c_str(), &status) != 0 || S_ISREG(status.st_mode)) return target;
+  if (S_ISDIR(status.st_mode)) throw_cannot_write(path, EISDIR);
+  throw_error(ErrorCode::kOutput, "{}: expected a file to replace, found a device or a pipe",
+              path.string());
+}
+
 OutputFile::OutputFile(std::filesystem::path path) : path_(std::move(path)) {
-  // A link stays, its target is replaced; a device or a pipe would be.
-  if (is_link(path_) && exists_at(path_)) path_ = without_links(path_);
-  if (is_folder(path_)) throw_cannot_write(path_, EISDIR);
-  if (exists_at(path_) && !is_file(path_)) {
-    throw_error(ErrorCode::kOutput, "{}: expected a file to replace, found a device or a pipe",
-                path_.string());
-  }
-  // The process id keeps two programs writing the same file from mixing their bytes.
-  aside_ = path_.parent_path() / aside_name(path_.filename().string());
-  file_ = std::fopen(aside_.c_str(), "wb");
+  if (path_.empty()) throw_cannot_write(path_, ENOENT);
+  target_ = output_file_target(path_);
+  aside_ = make_unique(target_.parent_path() / partial_prefix(target_.filename().string()),
+                       [&](const std::filesystem::path& aside) {
+                         const int file =
+                             open(aside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+                         if (file >= 0) file_ = fdopen(file, "wb");
+                         return file >= 0;
+                       });
   if (file_ == nullptr) throw_cannot_write(path_, errno);
 }
 
@@ -67,7 +69,7 @@ void OutputFile::commit() {
   const bool closed = std::fclose(file_) == 0;
   const int close_error = errno;
   file_ = nullptr;
-  if (flushed && closed && std::rename(aside_.c_str(), path_.c_str()) == 0) return;
+  if (flushed && closed && std::rename(aside_.c_str(), target_.c_str()) == 0) return;
   const int error = !flushed ? flush_error : !closed ? close_error : errno;
   unlink(aside_.c_str());
   throw_cannot_write(path_, error);

@@ -11,6 +11,10 @@
 
 namespace vggtcd {
 
+// The file that is meant by `path`: a link stays, what it leads to is replaced, there or not.
+// Throws Error{kOutput} for a directory, a device or a pipe.
+std::filesystem::path output_file_target(const std::filesystem::path& path);
+
 // Every failure (no such directory, no permission, disk full) throws Error{kOutput} naming the
 // path.
 class OutputFile {
@@ -25,8 +29,9 @@ class OutputFile {
   void commit();
 
  private:
-  std::filesystem::path path_;
-  std::filesystem::path aside_;
+  std::filesystem::path path_;    // as it was given, for messages
+  std::filesystem::path target_;  // without links
+  std::filesystem::path aside_;   // beside it, under a name of its own
   std::FILE* file_ = nullptr;
 };
 

@@ -4,7 +4,6 @@
 
 #include "vggtcd/core/version.h"
 #include "vggtcd/io/json_file.h"
-#include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/sim3_file.h"
 #include "vggtcd/pipeline/change_list.h"
@@ -143,6 +142,16 @@ std::optional<MetricProblem> metric_problem_of(const EpochInputs& inputs, const 
   return MetricProblem(inputs.metric, epochs.before, epochs.after, progress);
 }
 
+OutputContents register_contents(bool authors_layout) {
+  OutputContents contents{kResultsKind, {"summary.json", "sim3.json"}};
+  if (authors_layout) {
+    contents.names.insert(contents.names.end(),
+                          {"coarse_sim3.npz", "fine_sim3.npz", "pred_poses_t1.npy",
+                           "pred_poses_t2.npy", "timing.json"});
+  }
+  return contents;
+}
+
 PointVariance registration_variance(const Alignment& alignment) {
   if (!alignment.uncertainty) return {};
   return {alignment.uncertainty->covariance, alignment.uncertainty->pivot};
@@ -169,6 +178,17 @@ std::span<const EnumName<ChangeMethod>> enum_names(ChangeMethod) {
   return kNames;
 }
 
+OutputContents detect_contents(const DetectOptions& options) {
+  OutputContents contents{
+      kResultsKind,
+      {"summary.json", "sim3.json", "cameras_before.tum", "cameras_after.tum", "colmap/",
+       "change.npz", "changes.json", "changes.csv", "before_aligned.ply", "after.ply"}};
+  if (!options.explain.empty()) contents.names.push_back("explain.json");
+  if (options.overlays) contents.names.push_back("overlays/");
+  if (options.page) contents.names.push_back("report.html");
+  return contents;
+}
+
 bool decides_by_votes(const DetectOptions& options, bool has_holes) {
   if (options.change_method != ChangeMethod::kAuto) {
     return options.change_method == ChangeMethod::kFreeSpace;
@@ -189,7 +209,7 @@ void DetectOptions::validate() const {
 DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
                      const std::filesystem::path& out, ProgressSink& progress) {
   options.validate();
-  OutputDirectory directory(out, {kStages});
+  OutputDirectory directory(out, detect_contents(options));
   StageLog log(progress);
   DetectOutcome outcome;
 
@@ -307,7 +327,7 @@ RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOption
                                 bool authors_layout, const std::filesystem::path& out,
                                 ProgressSink& progress) {
   options.validate();
-  OutputDirectory directory(out);
+  OutputDirectory directory(out, register_contents(authors_layout));
   StageLog log(progress);
   Epochs epochs = read_epochs(inputs, options, log);
   Json summary = summary_head("register", inputs, epochs);

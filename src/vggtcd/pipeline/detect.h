@@ -8,6 +8,7 @@
 #include "vggtcd/change/free_space.h"
 #include "vggtcd/change/instances.h"
 #include "vggtcd/change/nearest_distance.h"
+#include "vggtcd/io/output_directory.h"
 #include "vggtcd/pipeline/alignment.h"
 #include "vggtcd/pipeline/metres.h"
 #include "vggtcd/report/report_page.h"
@@ -69,6 +70,9 @@ struct DetectOptions {
   };
   void validate() const;
 };
+
+// What detect() writes with these options.
+OutputContents detect_contents(const DetectOptions& options);
 
 // Whether detect() lets the votes decide, for depth with or without holes.
 bool decides_by_votes(const DetectOptions& options, bool has_holes);

@@ -12,8 +12,8 @@
 #include "vggtcd/core/version.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/kept_files.h"
 #include "vggtcd/io/output_directory.h"
-#include "vggtcd/io/output_file.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/pipeline/job_plan.h"
@@ -84,14 +84,20 @@ std::string stage_key(const PhotoEpochs& photos, const Reconstructor& reconstruc
 
 // Written last: the stage is complete when it is there.
 constexpr const char* kComplete = "reconstruction.json";
+constexpr const char* kWork = "work";  // the reconstructor's own
 
-// OUT holds nothing but what we may replace, so that .stages may live in it from now on.
-void claim(const fs::path& out) {
-  { const OutputDirectory check(out, {kStages}); }
-  make_folder(out / kStages);
-  const fs::path marker = out / OutputDirectory::kMarker;
-  if (!exists_at(marker)) {
-    write_text_file(marker, "Written by vggt-cd, which may replace this directory.\n");
+// What reconstruct() leaves, all whole.
+bool is_complete(const fs::path& kept, const PhotoEpochs& photos) {
+  return is_kept(kept, kComplete) && is_kept(kept, kJointFile) &&
+         (photos.before.given || is_kept(kept, kBeforeFile)) &&
+         (photos.after.given || is_kept(kept, kAfterFile));
+}
+
+void note_damaged(const fs::path& kept, ProgressSink& progress) {
+  for (const fs::path& folder : {kept, kept / kWork}) {
+    for (const std::string& file : damaged_files(folder)) {
+      progress.notice(fmt::format("{}: is damaged and made again", (folder / file).string()));
+    }
   }
 }
 
@@ -174,11 +180,12 @@ PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress)
 
 std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& options,
                           const fs::path& out, ProgressSink& progress) {
+  OutputDirectory::check_usable(out, detect_contents(options));
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
   ReconstructionPlan plan = reconstructor->plan(photos);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
-  if (exists_at(kept / kComplete)) {
+  if (is_complete(kept, photos)) {
     plan.note = fmt::format("none: reconstruction of an earlier run is used again ({})",
                             escaped(kept.string()));
     plan.stages.clear();
@@ -197,7 +204,9 @@ std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& option
       memory_and_time(memory, whole_job(plan, *reconstructor, options, votes)));
 }
 
-std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options) {
+std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options,
+                          const fs::path& out) {
+  OutputDirectory::check_usable(out, detect_contents(options));
   const PredictionSize before = prediction_size(inputs.before);
   const PredictionSize after = prediction_size(inputs.after);
   const JobSize size{before.frames, after.frames, before.width, before.height,
@@ -212,26 +221,30 @@ std::string describe_plan(const EpochInputs& inputs, const DetectOptions& option
 
 ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOptions& options,
                                        const fs::path& out, ProgressSink& progress) {
+  OutputDirectory::check_usable(out, detect_contents(options));
   const PhotoEpochs photos = find_photo_epochs(inputs, progress);
   const auto reconstructor = choose_reconstructor(inputs.reconstruction, progress);
-  claim(out);
+  OutputDirectory::claim(out, detect_contents(options));
+  make_folder(out / kStages);
   ReconstructedPhotos done;
   done.lock = lock_stages(out);
   const fs::path kept = out / kStages / stage_key(photos, *reconstructor);
   const fs::path complete = kept / kComplete;
-  if (exists_at(complete)) {
+  if (is_complete(kept, photos)) {
     progress.notice(
         fmt::format("reconstruction of an earlier run is used again ({})", kept.string()));
   } else {
     make_folder(kept);
     remove_partial_files(kept);
+    note_damaged(kept, progress);
     progress.job_planned(whole_job(reconstructor->plan(photos), *reconstructor, options,
                                    decides_by_votes(options, reconstructor->leaves_holes())));
     const std::string explanation = reconstructor->reconstruct(photos, kept, progress);
     write_json_file(complete,
                     Json{{"reconstructor", reconstructor->name()}, {"explanation", explanation}});
+    keep(kept, kComplete);
   }
-  remove_tree(kept / "work");
+  remove_tree(kept / kWork);
   done.inputs.before = photos.before.given ? fs::path(inputs.before) : kept / kBeforeFile;
   done.inputs.after = photos.after.given ? fs::path(inputs.after) : kept / kAfterFile;
   done.inputs.joint = kept / kJointFile;

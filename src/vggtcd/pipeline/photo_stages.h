@@ -25,11 +25,12 @@ PhotoEpochs find_photo_epochs(const PhotoInputs& inputs, ProgressSink& progress)
 
 // The plan of the whole job, in words, for --dry-run; a reconstruction that OUT/.stages keeps is
 // not planned again. Reads all photos and throws what the job would throw for those that cannot be
-// read or do not go together.
+// read or do not go together, and for an OUT that cannot take the results.
 std::string describe_plan(const PhotoInputs& inputs, const DetectOptions& options,
                           const std::filesystem::path& out, ProgressSink& progress);
 // The same for two prediction files.
-std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options);
+std::string describe_plan(const EpochInputs& inputs, const DetectOptions& options,
+                          const std::filesystem::path& out);
 
 struct ReconstructedPhotos {
   EpochInputs inputs;       // before.npz, after.npz and joint.npz in OUT/.stages/KEY, or as given
@@ -39,7 +40,8 @@ struct ReconstructedPhotos {
 
 // Reconstructs unless OUT/.stages has the result for these photos and options already; KEY is a
 // hash of the photos' bytes, their names and all that the reconstruction depends on. What an
-// interrupted run has finished there is used. Throws Error{kOutput} while another process is at it.
+// interrupted run has finished there is used, what is damaged is made again. Throws Error{kOutput}
+// while another process is at it.
 // `options` are for the plan of the whole job that `progress` is told.
 ReconstructedPhotos reconstruct_photos(const PhotoInputs& inputs, const DetectOptions& options,
                                        const std::filesystem::path& out, ProgressSink& progress);

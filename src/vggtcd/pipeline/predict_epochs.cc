@@ -7,6 +7,8 @@
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
+#include "vggtcd/io/kept_files.h"
+#include "vggtcd/io/output_directory.h"
 #include "vggtcd/reconstruction/vggt_reconstructor.h"
 
 namespace vggtcd {
@@ -38,15 +40,59 @@ Json identity(const PhotoEpochs& photos, const VggtReconstructor& network) {
   return json;
 }
 
+// What says from which photos and by which network the files are, and where they are made.
+constexpr const char* kNote = "photos.json";
+constexpr const char* kWork = ".work";
+
+OutputContents contents_of(const std::vector<JointPass>& joints) {
+  OutputContents contents{"predictions", {kNote}};
+  for (const auto& epoch : kEpochs) contents.names.push_back(epoch.file);
+  for (const JointPass& joint : joints) contents.names.push_back(joint.file);
+  return contents;
+}
+
+bool is_of(const fs::path& note, const Json& made_from) {
+  if (!exists_at(note)) return false;
+  try {
+    return read_json_file(note) == made_from;
+  } catch (const Error&) {
+    return false;  // damaged: made again
+  }
+}
+
 // Leaves nothing in the directory that was made from other photos or by another network.
 void claim(const fs::path& directory, const Json& made_from, const std::vector<JointPass>& joints) {
-  make_folder(directory);
-  const fs::path note = directory / "photos.json";
-  if (exists_at(note) && read_json_file(note) == made_from) return;
-  remove_tree(directory / "work");
-  for (const auto& epoch : kEpochs) remove_tree(directory / epoch.file);
-  for (const JointPass& joint : joints) remove_tree(directory / joint.file);
-  write_json_file(note, made_from);
+  OutputDirectory::check_usable(directory, contents_of(joints));  // what is there is whole
+  if (is_of(directory / kNote, made_from)) return;
+  OutputDirectory replaced(directory, contents_of(joints));
+  remove_tree(directory / kWork);
+  write_json_file(replaced / kNote, made_from);
+  replaced.commit();
+}
+
+// The epochs that are there already, as the reconstructor finds them again.
+void provide_epochs(const fs::path& directory, const fs::path& work) {
+  make_folder(work);
+  for (const auto& epoch : kEpochs) {
+    if (!exists_at(directory / epoch.file) || is_kept(work, epoch.scratch)) continue;
+    remove_tree(work / epoch.scratch);
+    copy_unless_there(directory / epoch.file, work / epoch.scratch);
+    keep(work, epoch.scratch);
+  }
+}
+
+// The joint pass, and the epochs that are not there yet.
+void put_in_place(const fs::path& work, const fs::path& directory, const JointPass& joint) {
+  OutputContents contents{"predictions", {joint.file}, true};
+  for (const auto& epoch : kEpochs) {
+    if (!exists_at(directory / epoch.file)) contents.names.push_back(epoch.file);
+  }
+  OutputDirectory out(directory, contents);
+  move_to(work / "joint.npz", out / joint.file);
+  for (const auto& epoch : kEpochs) {
+    if (!exists_at(directory / epoch.file)) move_to(work / epoch.scratch, out / epoch.file);
+  }
+  out.commit();
 }
 
 }  // namespace
@@ -62,7 +108,7 @@ void predict_epochs(const PhotoPaths& paths, const fs::path& weights, const Vggt
       directory,
       identity(photos, VggtReconstructor({.weights = weights, .keyframes = 0, .network = network})),
       joints);
-  const fs::path work = directory / "work";
+  const fs::path work = directory / kWork;
   const int all = static_cast<int>(std::max(paths.before.size(), paths.after.size()));
   for (const JointPass& joint : joints) {
     const bool complete = exists_at(directory / joint.file) &&
@@ -80,19 +126,10 @@ void predict_epochs(const PhotoPaths& paths, const fs::path& weights, const Vggt
                                   static_cast<double>(needed) * 1e-9));
       continue;
     }
-    make_folder(work);
-    for (const auto& epoch : kEpochs) {
-      if (!exists_at(directory / epoch.file)) continue;
-      copy_unless_there(directory / epoch.file, work / epoch.scratch);
-    }
-    remove_tree(work / "joint.npz");
+    provide_epochs(directory, work);
+    remove_tree(work / "joint.npz");  // of another number of keyframes
     reconstructor.reconstruct(photos, work, progress);
-    move_to(work / "joint.npz", directory / joint.file);
-    for (const auto& epoch : kEpochs) {
-      if (!exists_at(directory / epoch.file)) {
-        move_to(work / epoch.scratch, directory / epoch.file);
-      }
-    }
+    put_in_place(work, directory, joint);
   }
   remove_tree(work);
 }

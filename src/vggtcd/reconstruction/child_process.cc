@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <sstream>
 #include <thread>
 
@@ -20,6 +21,8 @@
 
 namespace vggtcd {
 namespace {
+
+constexpr int kNotStarted = 127;  // as shells say it
 
 std::string find_in_path(const std::string& program) {
   const char* path = std::getenv("PATH");
@@ -51,7 +54,7 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
 [[noreturn]] void become(const char* file, char* const* arguments, char* const* environment,
                          int log, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != parent) _exit(126);
+  if (getppid() != parent) _exit(kNotStarted);
   const int nothing = open("/dev/null", O_RDONLY);
   dup2(nothing, STDIN_FILENO);
   dup2(log, STDOUT_FILENO);
@@ -59,11 +62,24 @@ std::vector<char*> pointers(const std::vector<std::string>& texts) {
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
   signal(SIGPIPE, SIG_DFL);
+  signal(SIGXFSZ, SIG_DFL);
   execve(file, arguments, environment);
-  _exit(127);
+  _exit(kNotStarted);
 }
 
 }  // namespace
+
+std::string ProgramEnd::in_words() const {
+  if (signal == 0 && status <= 128) return fmt::format("exit status {}", status);
+  if (signal == 0) {
+    return fmt::format("exit status {} (of a script: signal {}, {})", status, status - 128,
+                       strsignal(status - 128));
+  }
+  std::string words = fmt::format("it was ended by signal {} ({})", signal, strsignal(signal));
+  if (signal == SIGKILL) words += ", as when memory is short or a batch system's time is over";
+  if (signal == SIGXFSZ) words += ", for a file became larger than is allowed (ulimit -f)";
+  return words;
+}
 
 std::string require_program(const std::string& program, const std::string& remedy) {
   std::string file = find_in_path(program);
@@ -73,8 +89,8 @@ std::string require_program(const std::string& program, const std::string& remed
   return file;
 }
 
-int run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
-                const std::string& remedy, const std::function<void()>& while_running) {
+ProgramEnd run_program(const std::vector<std::string>& arguments, const std::filesystem::path& log,
+                       const std::string& remedy, const std::function<void()>& while_running) {
   throw_if_interrupted();
   const std::string file = require_program(arguments.at(0), remedy);
   const int log_file = open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
@@ -103,7 +119,12 @@ int run_program(const std::vector<std::string>& arguments, const std::filesystem
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  throw_if_interrupted();  // the signal may have reached the child first
+  if (WIFSIGNALED(status)) return {0, WTERMSIG(status)};
+  if (WEXITSTATUS(status) == kNotStarted) {
+    throw_error(ErrorCode::kUnavailable, "{}: cannot be started; {}", file, remedy);
+  }
+  return {WEXITSTATUS(status), 0};
 }
 
 }  // namespace vggtcd

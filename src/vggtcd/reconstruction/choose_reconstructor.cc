@@ -14,16 +14,6 @@ namespace {
 
 constexpr const char* kWithoutWeights = "detect also works without (--reconstructor classical)";
 
-// Empty: none.
-std::string found_weights(const std::string& given) {
-  if (!given.empty()) return given;
-  if (const char* named = std::getenv("VGGTCD_WEIGHTS"); named && *named) return named;
-  const char* home = std::getenv("HOME");
-  const auto usual =
-      std::filesystem::path(home ? home : "") / ".local/share/vggt-cd/model.safetensors";
-  return is_file(usual) ? usual.string() : std::string();
-}
-
 }  // namespace
 
 std::span<const EnumName<ReconstructorKind>> enum_names(ReconstructorKind) {
@@ -40,8 +30,17 @@ void ReconstructorOptions::validate() const {
               frame_side, "a multiple of 14 from 56 to 1036");
 }
 
+std::string find_weights(const std::string& given) {
+  if (!given.empty()) return given;
+  if (const char* named = std::getenv("VGGTCD_WEIGHTS"); named && *named) return named;
+  const char* home = std::getenv("HOME");
+  const auto usual =
+      std::filesystem::path(home ? home : "") / ".local/share/vggt-cd/model.safetensors";
+  return is_file(usual) ? usual.string() : std::string();
+}
+
 std::filesystem::path require_weights(const std::string& given) {
-  const std::string weights = found_weights(given);
+  const std::string weights = find_weights(given);
   if (weights.empty()) {
     throw_error(ErrorCode::kWeights,
                 "no network weights: expected --weights FILE, VGGTCD_WEIGHTS or "
@@ -61,7 +60,7 @@ std::unique_ptr<Reconstructor> choose_reconstructor(const ReconstructorOptions& 
   options.validate();
   ReconstructorKind kind = options.reconstructor;
   const std::string weights =
-      kind == ReconstructorKind::kClassical ? std::string() : found_weights(options.weights);
+      kind == ReconstructorKind::kClassical ? std::string() : find_weights(options.weights);
   if (kind == ReconstructorKind::kAuto && weights.empty()) {
     progress.notice(
         "no network weights (--weights): classical reconstruction, which needs ten or more "

@@ -33,8 +33,11 @@ struct ReconstructorOptions {
   void validate() const;
 };
 
-// The weights file that is meant: `given`, else VGGTCD_WEIGHTS, else the usual place. Throws
-// Error{kWeights} if there is none or no such file.
+// The weights file that is meant: `given`, else VGGTCD_WEIGHTS, else the usual place; empty if
+// there is none in any of them.
+std::string find_weights(const std::string& given);
+
+// The same. Throws Error{kWeights} if there is none or no such file.
 std::filesystem::path require_weights(const std::string& given);
 
 // Throws Error{kWeights} if vggt is asked for and no weights are given or found. In auto,

@@ -10,6 +10,7 @@
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
 #include "vggtcd/io/file_system.h"
+#include "vggtcd/io/kept_files.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/reconstruction/undistort.h"
 
@@ -329,12 +330,13 @@ std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const
   for (const int photo : sfm.photo_of_view) epoch_of_view.push_back(photo < photos_t1 ? 1 : 2);
   const std::vector<DepthTask> tasks = plan_depth(sfm.model, epoch_of_view, options_.views);
   const auto epoch = [&](const EpochTask& task, const EpochPhotos& of, const char* file) {
-    const fs::path kept = (of.given ? work : folder) / file;
-    if (!exists_at(kept)) {
+    const fs::path& where = of.given ? work : folder;
+    if (!is_kept(where, file)) {
       ProgressStage stage(progress, std::string(task.name) + ": depth");
-      write_reconstruction(kept, make_epoch(task, sfm, tasks, size, options_, stage));
+      write_reconstruction(where / file, make_epoch(task, sfm, tasks, size, options_, stage));
+      keep(where, file);
     }
-    Reconstruction result = read_reconstruction(kept, progress);
+    Reconstruction result = read_reconstruction(where / file, progress);
     note_left_out(task.unplaced, task.name, "that could not be placed", progress);
     note_left_out(without_depth(task, sfm, result), task.name, "without depth", progress);
     return result;
@@ -343,13 +345,14 @@ std::string ClassicalReconstructor::reconstruct(const PhotoEpochs& photos, const
       epoch(epoch_task("before", photos.before.photos, 0, sfm), photos.before, kBeforeFile);
   const Reconstruction after =
       epoch(epoch_task("after", photos.after.photos, photos_t1, sfm), photos.after, kAfterFile);
-  if (!exists_at(folder / kJointFile)) {
+  if (!is_kept(folder, kJointFile)) {
     JointReconstruction joint = joint_of_keyframes(before, after, options_.keyframes);
     renumber(photos.before, before, joint.keyframes_t1);
     renumber(photos.after, after, joint.keyframes_t2);
     joint.keyframes_t1 = numbers_in_file(photos.before, joint.keyframes_t1);
     joint.keyframes_t2 = numbers_in_file(photos.after, joint.keyframes_t2);
     write_joint(folder / kJointFile, joint);
+    keep(folder, kJointFile);
   }
   const auto made = [](int placed, const Reconstruction& result, const EpochPhotos& of) {
     return fmt::format("{} of {} {} placed, depth known for {:.0f} % of the pixels of {}", placed,

@@ -61,11 +61,11 @@ class Reconstructor {
   // that cannot be decoded, and for photos that do not go together.
   virtual void check_photos(const PhotoEpochs& photos, ProgressSink& progress) const = 0;
   // Writes before.npz and after.npz, of the epochs that are not given, and joint.npz into `folder`,
-  // each when it is complete; what an earlier call with the same photos and fingerprint left there
-  // is used. Files and folders of other names there are its own. Same photos and fingerprint, same
-  // bytes, whether interrupted or not. Returns one sentence: what was done and how far it can be
-  // trusted. Throws Error{kDegenerate} with the reason when the photos do not carry a
-  // reconstruction that can be trusted.
+  // and keeps each when it is complete (io/kept_files.h); what an earlier call with the same photos
+  // and fingerprint kept there is used. Files and folders of other names there are its own. Same
+  // photos and fingerprint, same bytes, whether interrupted or not. Returns one sentence: what was
+  // done and how far it can be trusted. Throws Error{kDegenerate} with the reason when the photos
+  // do not carry a reconstruction that can be trusted.
   virtual std::string reconstruct(const PhotoEpochs& photos, const std::filesystem::path& folder,
                                   ProgressSink& progress) const = 0;
 };

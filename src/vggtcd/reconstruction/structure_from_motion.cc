@@ -14,6 +14,8 @@
 
 #include "vggtcd/io/file_system.h"
 #include "vggtcd/io/input_file.h"
+#include "vggtcd/io/kept_files.h"
+#include "vggtcd/io/output_file.h"
 #include "vggtcd/io/quote.h"
 #include "vggtcd/reconstruction/child_process.h"
 #include "vggtcd/reconstruction/match_file.h"
@@ -26,6 +28,11 @@ namespace fs = std::filesystem;
 
 constexpr const char* kRemedy =
     "install COLMAP (Debian: apt-get install colmap), or give network weights with --weights";
+
+// What the scratch folder keeps.
+constexpr const char* kMatches = "matches.npz";
+constexpr const char* kModel = "model";
+constexpr const char* kNoModel = "no_model";
 
 // A photo as COLMAP gets it: one folder for each camera, names by which it sorts as we do.
 struct ColmapPhoto {
@@ -98,17 +105,35 @@ class Colmap {
  public:
   explicit Colmap(fs::path folder) : folder_(std::move(folder)) {}
 
-  int status(std::vector<std::string> arguments,
-             const std::function<void()>& while_running = {}) const {
+  ProgramEnd end_of(std::vector<std::string> arguments,
+                    const std::function<void()>& while_running = {}) const {
     arguments.insert(arguments.begin(), "colmap");
     return run_program(arguments, log(), kRemedy, while_running);
   }
   void run(const std::vector<std::string>& arguments) const {
-    if (const int found = status(arguments); found != 0) {
-      throw_error(ErrorCode::kUnavailable,
-                  "colmap {}: expected exit status 0, found {}; its output is in {}",
-                  arguments.front(), found, log().string());
+    const ProgramEnd end = end_of(arguments);
+    if (!end.succeeded()) throw_failed(arguments.front(), end);
+  }
+  // Not the photos' fault, as far as is known: the same command may succeed.
+  [[noreturn]] void throw_failed(const std::string& command, const ProgramEnd& end) const {
+    throw_error(ErrorCode::kUnavailable,
+                "colmap {}: expected exit status 0, found {}; its output is in {}; the finished "
+                "stages are kept: run it again, with more memory or fewer photos (--frames)",
+                command, end.in_words(), log().string());
+  }
+  std::uintmax_t log_size() const {
+    return is_file(log()) ? size_of_file(log()) : 0;
+  }
+  // The only way in which the mapper says that the photos determine no model, in what it wrote
+  // behind the first bytes of the log.
+  bool found_no_model(const ProgramEnd& end, std::uintmax_t first) const {
+    if (end.signal != 0 || end.status != 1) return false;
+    InputFile file(log(), "COLMAP's log");
+    file.seekg(static_cast<std::streamoff>(first));
+    for (std::string line; std::getline(file, line);) {
+      if (line.find("failed to create sparse model") != std::string::npos) return true;
     }
+    return false;
   }
   fs::path log() const { return folder_ / "colmap.log"; }
   // How many photos the mapper has tried to place since the last line that starts a model.
@@ -179,42 +204,58 @@ class Mapper {
     const auto show = [&] {
       stage.advance(0.98 * colmap.placed() / static_cast<double>(listed_.size()));
     };
-    const int status = colmap.status({"mapper",
-                                      "--database_path",
-                                      database,
-                                      "--image_path",
-                                      (folder_ / "images").string(),
-                                      "--output_path",
-                                      models.string(),
-                                      "--Mapper.num_threads",
-                                      "1",
-                                      "--Mapper.extract_colors",
-                                      "0",
-                                      "--Mapper.min_model_size",
-                                      "3",
-                                      "--Mapper.max_num_models",
-                                      "3",
-                                      "--Mapper.init_min_tri_angle",
-                                      std::to_string(options_.init_min_tri_angle_deg),
-                                      "--Mapper.init_min_num_inliers",
-                                      std::to_string(options_.init_min_num_inliers),
-                                      "--Mapper.abs_pose_min_num_inliers",
-                                      "20"},
-                                     show);
-    if (status != 0) return std::nullopt;  // it found nothing
-    std::optional<fs::path> best;
-    size_t most = 0;
-    for (int i = 0; exists_at(models / std::to_string(i) / "points3D.bin"); ++i) {
-      const size_t views = read_colmap_model(models / std::to_string(i)).views.size();
-      if (views <= most) continue;
-      most = views;
-      best = models / std::to_string(i);
-    }
-    if (best) number_views(read_colmap_model(*best), names_, colmap.log());
+    const std::uintmax_t log_size = colmap.log_size();
+    const ProgramEnd end = colmap.end_of({"mapper",
+                                          "--database_path",
+                                          database,
+                                          "--image_path",
+                                          (folder_ / "images").string(),
+                                          "--output_path",
+                                          models.string(),
+                                          "--Mapper.num_threads",
+                                          "1",
+                                          "--Mapper.extract_colors",
+                                          "0",
+                                          "--Mapper.min_model_size",
+                                          "3",
+                                          "--Mapper.max_num_models",
+                                          "3",
+                                          "--Mapper.init_min_tri_angle",
+                                          std::to_string(options_.init_min_tri_angle_deg),
+                                          "--Mapper.init_min_num_inliers",
+                                          std::to_string(options_.init_min_num_inliers),
+                                          "--Mapper.abs_pose_min_num_inliers",
+                                          "20"},
+                                         show);
+    if (colmap.found_no_model(end, log_size)) return std::nullopt;
+    if (!end.succeeded()) colmap.throw_failed("mapper", end);
+    const std::optional<fs::path> best = largest_of(models);
+    if (best) number_views(read_colmap_model(*best), names_of(listed_), colmap.log());
     return best;
   }
 
  private:
+  static std::optional<fs::path> largest_of(const fs::path& models) {
+    std::optional<fs::path> best;
+    size_t most = 0;
+    for (int i = 0; exists_at(models / std::to_string(i) / "points3D.bin"); ++i) {
+      const fs::path model = models / std::to_string(i);
+      size_t views = 0;
+      try {
+        views = read_colmap_model(model).views.size();
+      } catch (const Error& error) {  // it does not look whether all could be written
+        throw_error(ErrorCode::kUnavailable,
+                    "colmap mapper: expected a model that can be read, found: {}; is the disk "
+                    "full? run it again when it is not",
+                    error.what());
+      }
+      if (views <= most) continue;
+      most = views;
+      best = model;
+    }
+    return best;
+  }
+
   // The cameras whose focal length is to be guessed together, each of the others alone.
   void import_epoch(const Colmap& colmap, bool before, double focal_factor,
                     const std::string& database) const {
@@ -275,8 +316,8 @@ class Mapper {
 // Stage 1: key points and matches, from scratch/matches.npz if they are there.
 SparseMatches find_matches(const std::vector<Image>& images, const SfmOptions& options,
                            const fs::path& scratch, ProgressSink& progress) {
-  const fs::path kept = scratch / "matches.npz";
-  if (exists_at(kept)) return read_matches(kept);
+  const fs::path kept = scratch / kMatches;
+  if (is_kept(scratch, kMatches)) return read_matches(kept);
   SparseMatches matches;
   {
     ProgressStage stage(progress, "key points");
@@ -285,35 +326,48 @@ SparseMatches find_matches(const std::vector<Image>& images, const SfmOptions& o
   ProgressStage stage(progress, "matching");
   matches.pairs = match_all(matches.features, options.min_pair_inliers, stage);
   write_matches(kept, matches);
+  keep(scratch, kMatches);
   return read_matches(kept);  // what is kept is what is used
 }
 
-// Stage 2: COLMAP's model, from scratch/model if it is there; an empty folder says that none was
-// found.
+// The largest model of two first guesses of unknown focal lengths; nothing if neither gives one.
+std::optional<fs::path> best_model(const Mapper& mapper, size_t photos, ProgressStage& stage) {
+  constexpr double kEnough = 0.9;
+  std::optional<fs::path> best;
+  size_t most = 0;
+  for (const double focal_factor : {1.2, 0.85}) {
+    const std::optional<fs::path> found = mapper.run(focal_factor, stage);
+    const size_t views = found ? read_colmap_model(*found).views.size() : 0;
+    if (views > most) {
+      most = views;
+      best = found;
+    }
+    if (static_cast<double>(views) >= kEnough * static_cast<double>(photos)) break;
+  }
+  return best;
+}
+
+// Stage 2: COLMAP's model, from scratch/model if it is kept; or that there is none, if that is what
+// the photos gave.
 SfmModel find_model(const SfmPhotos& photos, const std::vector<ColmapPhoto>& listed,
                     const SparseMatches& matches, const SfmOptions& options,
                     const fs::path& scratch, ProgressSink& progress) {
-  const fs::path kept = scratch / "model";
-  if (!exists_at(kept)) {
+  if (is_kept(scratch, kNoModel)) return {};
+  const fs::path kept = scratch / kModel;
+  if (!is_kept(scratch, kModel)) {
     ProgressStage stage(progress, "structure from motion");
-    constexpr double kEnough = 0.9;
     const Mapper mapper(photos, listed, matches, options, scratch / "colmap");
-    std::optional<fs::path> best;
-    size_t most = 0;
-    for (const double focal_factor : {1.2, 0.85}) {
-      const std::optional<fs::path> found = mapper.run(focal_factor, stage);
-      const size_t views = found ? read_colmap_model(*found).views.size() : 0;
-      if (views > most) {
-        most = views;
-        best = found;
-      }
-      if (static_cast<double>(views) >= kEnough * static_cast<double>(listed.size())) break;
+    const std::optional<fs::path> best = best_model(mapper, listed.size(), stage);
+    if (!best) {
+      write_text_file(scratch / kNoModel, "COLMAP's mapper found no model of these photos.\n");
+      keep(scratch, kNoModel);
+      return {};
     }
-    const fs::path empty = scratch / "colmap" / "none";
-    make_folder(empty);
-    move_to(best ? *best : empty, kept);
+    remove_tree(kept);
+    move_to(*best, kept);
+    keep(scratch, kModel);
   }
-  return list_folder(kept).empty() ? SfmModel{} : read_colmap_model(kept);
+  return read_colmap_model(kept);
 }
 
 }  // namespace

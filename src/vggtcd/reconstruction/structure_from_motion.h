@@ -56,9 +56,11 @@ void require_colmap();
 // epoch, photo size, and device, lens, focal length and zoom as EXIF tells them (photo_cameras.h);
 // their focal lengths start at 1.2 and, where that leaves photos out, at 0.85 times the longer
 // side, or, where an epoch has several lenses, where EXIF says. Known ones are SIMPLE_PINHOLE and
-// start as they are. Chosen is the model with most photos. `scratch` keeps the two stages,
-// matches.npz and model/; what an earlier call with the same photos and options left there is used.
-// Throws Error{kUnavailable} without COLMAP; a model without views if none was found.
+// start as they are. Chosen is the model with most photos; it is without views if the photos gave
+// none. `scratch` keeps the two stages (io/kept_files.h), matches.npz and model/ or no_model; what
+// an earlier call with the same photos and options left there is used. Throws Error{kUnavailable}
+// without COLMAP, and if COLMAP was ended or failed for another reason than the photos: nothing of
+// that is kept.
 SfmResult structure_from_motion(SfmPhotos photos, const SfmOptions& options,
                                 const std::filesystem::path& scratch, ProgressSink& progress);
 

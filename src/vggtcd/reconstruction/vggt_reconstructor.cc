@@ -10,6 +10,7 @@
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
 #include "vggtcd/io/file_system.h"
+#include "vggtcd/io/kept_files.h"
 #include "vggtcd/io/predictions.h"
 #include "vggtcd/io/weight_file.h"
 #include "vggtcd/io/weight_shards.h"
@@ -259,15 +260,16 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
   Passes passes(options_, progress);
   const auto epoch = [&](const char* name, const char* file, const EpochPhotos& of,
                          const Frames& frames) {
-    if (of.given || exists_at(folder / file)) return;
+    if (of.given || is_kept(folder, file)) return;
     write_reconstruction(folder / file, passes.run(name, frames));
+    keep(folder, file);
   };
   epoch("before", kBeforeFile, photos.before, before);
   epoch("after", kAfterFile, photos.after, after);
   JointReconstruction joint;
   joint.keyframes_t1 = select_keyframes(static_cast<int>(before.images.size()), options_.keyframes);
   joint.keyframes_t2 = select_keyframes(static_cast<int>(after.images.size()), options_.keyframes);
-  if (!exists_at(folder / kJointFile)) {
+  if (!is_kept(folder, kJointFile)) {
     Frames keyframes;
     append_keyframes(before, joint.keyframes_t1, keyframes);
     append_keyframes(after, joint.keyframes_t2, keyframes);
@@ -275,6 +277,7 @@ std::string VggtReconstructor::reconstruct(const PhotoEpochs& photos,
     joint.keyframes_t1 = numbers_in_file(photos.before, joint.keyframes_t1);
     joint.keyframes_t2 = numbers_in_file(photos.after, joint.keyframes_t2);
     write_joint(folder / kJointFile, joint);
+    keep(folder, kJointFile);
   }
   const auto made = [](const EpochPhotos& of) {
     return fmt::format("{} {}", of.photos.size(), of.given ? "given frames" : "photos");

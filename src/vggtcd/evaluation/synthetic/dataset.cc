@@ -74,6 +74,13 @@ void write_wat(const fs::path& root, const fs::path& photos, const SyntheticScen
   write_colmap_binary(base / "sparse" / "0", views, points);
 }
 
+OutputContents contents_of(const SynthesizeOptions& options) {
+  OutputContents contents{"scene", {"truth.json", "truth.npz", "t1.npz", "t2.npz", "joint.npz"}};
+  if (options.photos) contents.names.insert(contents.names.end(), {"before/", "after/"});
+  if (options.wat) contents.names.push_back("wat/");
+  return contents;
+}
+
 }  // namespace
 
 void SynthesizeOptions::validate() const {
@@ -93,7 +100,7 @@ void synthesize(const fs::path& directory, const SynthesizeOptions& options,
                 ProgressSink& progress) {
   options.validate();
   const SyntheticScene scene = make_scene(options.scene, options.seed, options.change);
-  OutputDirectory out(directory);
+  OutputDirectory out(directory, contents_of(options));
   if (options.photos) {
     for (const char* folder : kEpochFolder) out.subdirectory(folder);
   }
