@@ -51,7 +51,7 @@ def content(out):
             summary = json.loads(path.read_text())
             del summary["stages"]
             files[name] = json.dumps(summary)
-        elif name != "report.html":  # shows the times, too
+        elif name not in ("report.html", ".vggt-cd-results"):  # shows the times, too; hashes of both
             files[name] = path.read_bytes()
     return files
 
