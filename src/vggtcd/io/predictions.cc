@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/tensor_view.h"
@@ -52,6 +53,14 @@ std::string images_key(const NpzReader& npz) {
   return "";
 }
 
+// An archive may have any number of arrays, a message is one line that somebody reads.
+std::string some_of(const std::vector<std::string>& keys) {
+  constexpr size_t kShown = 20;
+  const size_t shown = std::min(keys.size(), kShown);
+  return fmt::format("{}{}", fmt::join(std::span(keys).first(shown), ", "),
+                     shown < keys.size() ? fmt::format(" and {} more", keys.size() - shown) : "");
+}
+
 PredictionLayout find_layout(const NpzReader& npz) {
   PredictionLayout layout;
   if (npz.has("extrinsic")) {
@@ -64,7 +73,7 @@ PredictionLayout find_layout(const NpzReader& npz) {
     throw_error(ErrorCode::kInput,
                 "{}: expected predictions with an array extrinsic (VGGT, MapAnything) or "
                 "extrinsics (Depth Anything 3), found {}",
-                npz.name(), fmt::join(npz.keys(), ", "));
+                npz.name(), some_of(npz.keys()));
   }
   for (const std::string& key : {layout.poses, layout.intrinsics, std::string("depth")}) {
     expect_float(npz, key);
