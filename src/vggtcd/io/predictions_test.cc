@@ -426,6 +426,14 @@ TEST(ReadReconstruction, OtherFilesAreRefusedWithTheKeysTheyHave) {
   EXPECT_INPUT_ERROR(f.read(arrays), "expected an array depth, found extrinsic");
 }
 
+TEST(ReadReconstruction, AMessageNamesSomeOfManyArrays) {
+  Fixture f;
+  Arrays arrays;
+  for (int i = 0; i < 30; ++i) arrays.set("a" + std::to_string(i), {1}, {0});
+  EXPECT_INPUT_ERROR(f.read(arrays), "found a0, a1, a2");
+  EXPECT_INPUT_ERROR(f.read(arrays), "a18, a19 and 10 more");
+}
+
 TEST(ReadReconstruction, WrongTypesAreNamed) {
   Fixture f;
   Arrays arrays = Arrays::vggt();
