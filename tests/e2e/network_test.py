@@ -102,7 +102,7 @@ class Network(unittest.TestCase):
     def test_each_pass_is_the_one_that_reconstruct_makes(self):
         kept = self.kept(self.out)
         self.assertEqual(sorted(p.name for p in kept.iterdir()),
-                         ["after.npz", "before.npz", "joint.npz", "reconstruction.json"])
+                         [".kept", "after.npz", "before.npz", "joint.npz", "reconstruction.json"])
         before, joint = np.load(kept / "before.npz"), np.load(kept / "joint.npz")
         self.assertEqual(before["depth"].shape, (3, 126, SIDE, 1))
         self.assertEqual(joint["depth"].shape, (4, 126, SIDE, 1))
