@@ -66,8 +66,8 @@ void prepare_process() {
   // It was for us, not for programs that we start.
   const char* blas = std::getenv(kBlasVariable.data());
   if (blas == g_no_blas_threads + kBlasVariable.size() + 1) unsetenv(kBlasVariable.data());
-  // The write fails instead, with a reason, and what was begun is cleaned up: a reader that is gone,
-  // a limit on the size of files (ulimit -f).
+  // The write fails instead, with a reason, and what was begun is cleaned up: a reader that is
+  // gone, a limit on the size of files (ulimit -f).
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
   // Freed arrays go back to the system at once: glibc would come to keep those below 32 MiB, which

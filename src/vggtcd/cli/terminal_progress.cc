@@ -14,6 +14,7 @@
 #include "vggtcd/cli/standard_streams.h"
 #include "vggtcd/core/job_clock.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/io/quote.h"
 
 namespace vggtcd::cli {
 namespace {

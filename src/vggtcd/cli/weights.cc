@@ -86,12 +86,12 @@ void add_info(Program& program, CLI::App& parent) {
   CLI::App* command = add_command(
       program, parent, "info", "Show what a weights file holds.", [path](ProgressSink&) {
         const WeightFile file = open_weight_file(*path);
-         print_answer("{:<13}{}\n", "file", escaped(*path));
-         print_answer("{:<13}{}\n", "format", weight_format_name(file.format));
-         if (!file.removed_prefix.empty()) {
-           print_answer("{:<13}{} before every name, left out\n", "prefix",
-                        escaped(file.removed_prefix));
-         }
+        print_answer("{:<13}{}\n", "file", escaped(*path));
+        print_answer("{:<13}{}\n", "format", weight_format_name(file.format));
+        if (!file.removed_prefix.empty()) {
+          print_answer("{:<13}{} before every name, left out\n", "prefix",
+                       escaped(file.removed_prefix));
+        }
         print_precision(file);
         const CheckpointReport report = inspect_checkpoint(file, *path);
         print_network(report, file.metadata.contains("config"));
@@ -116,7 +116,7 @@ void add_convert(Program& program, CLI::App& parent) {
       [arguments](ProgressSink& progress) {
         require_file_apart(arguments->to, {arguments->from});
         convert_weights(arguments->from, arguments->to, arguments->options, progress);
-         print_answer("{}\n", escaped(arguments->to));
+        print_answer("{}\n", escaped(arguments->to));
       });
   command->add_option("FILE", arguments->from, "A .safetensors or .pt file.")->required();
   command->add_option("-o,--out,--output", arguments->to, "The .safetensors file to write.")

@@ -252,8 +252,9 @@ TEST(ReadColmap, SaysWhatIsMissing) {
   const TemporaryDirectory directory;
   std::filesystem::create_directory(directory / "images.bin");
   EXPECT_INPUT_ERROR(read_colmap_trajectory(directory.path()),
-                     "images.bin: expected a readable file, found a directory");
-  EXPECT_INPUT_ERROR(read_colmap(directory.path()), "cameras.bin: expected a readable file");
+                     "images.bin: expected a file of a COLMAP model, found a directory");
+  EXPECT_INPUT_ERROR(read_colmap(directory.path()),
+                     "cameras.bin: expected a file of a COLMAP model");
   std::filesystem::remove(directory / "images.bin");
   EXPECT_INPUT_ERROR(read_colmap(directory.path()), "expected a COLMAP model (images.bin or");
 }

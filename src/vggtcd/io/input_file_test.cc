@@ -98,7 +98,7 @@ TEST(Readers, RefusePipes) {
   EXPECT_ERROR(open_weight_file(pipe("a.pt")), ErrorCode::kWeights, "a.pt");
   pipe("images.bin");
   pipe("cameras.bin");
-  EXPECT_INPUT_ERROR(read_reference_cameras(directory / "images.bin"), "cameras.bin");
+  EXPECT_INPUT_ERROR(read_reference_cameras(directory / "images.bin"), "images.bin");
   for (const char* name : {"b.jpg", "b.mp4"}) {
     EXPECT_INPUT_ERROR(find_photos(pipe(name).string(), {}, silent_progress()), name);
     EXPECT_INPUT_ERROR(content_hash({directory / name, name, nullptr}), name);

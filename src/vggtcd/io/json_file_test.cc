@@ -107,7 +107,7 @@ TEST(JsonFile, RefusesBrokenDeepAndMissingFiles) {
   expect("[-1e400, 0]", "a number that no double can hold");
   expect(std::string(1000000, '['), "expected JSON nested at most 100 deep");
   EXPECT_INPUT_ERROR(read_json_file(directory / "none.json"),
-                     "none.json: expected a readable file");
+                     "none.json: expected a readable JSON file");
   EXPECT_INPUT_ERROR(read_json_file(directory.path()), "found a directory");
   // Brackets in text do not count.
   write_bytes(directory / "a.json", "\"\\\"" + std::string(200, '[') + "\"");

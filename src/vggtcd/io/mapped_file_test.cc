@@ -18,9 +18,10 @@ TEST(ReadFileBytes, GivesTheBytesAndRefusesWhatIsNoFile) {
   EXPECT_EQ(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()), content);
   write_bytes(directory / "empty", "");
   EXPECT_TRUE(read_file_bytes(directory / "empty").empty());
-  EXPECT_INPUT_ERROR(read_file_bytes(directory / "none"), "none: cannot be read: No such file");
+  EXPECT_INPUT_ERROR(read_file_bytes(directory / "none"),
+                     "none: expected a file, found no such file");
   EXPECT_INPUT_ERROR(read_file_bytes(directory.path()), "directory");
-  EXPECT_INPUT_ERROR(read_file_bytes("/dev/zero"), "not an ordinary file");
+  EXPECT_INPUT_ERROR(read_file_bytes("/dev/zero"), "no ordinary file");
 }
 
 // Reading what is not there any more would be a SIGBUS.

@@ -111,7 +111,7 @@ TEST(NpyFile, RefusesTruncatedAndMissingFiles) {
   const TemporaryDirectory directory;
   EXPECT_INPUT_ERROR(read_npy_file(directory / "none.npy"), "none.npy");
   EXPECT_INPUT_ERROR(read_npy_file(directory.path()),
-                     "expected a readable file, found a directory");
+                     "expected a readable .npy file, found a directory");
   std::filesystem::copy_file(source_file("tests/golden/npz/f32_2x3.npy"), directory / "short.npy");
   std::filesystem::resize_file(directory / "short.npy", 128 + 23);
   EXPECT_INPUT_ERROR(read_npy_file(directory / "short.npy"), "expected 24 bytes of data, found 23");

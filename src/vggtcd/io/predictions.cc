@@ -406,13 +406,14 @@ Reconstruction read_arrays(const NpzReader& npz, ProgressSink& progress, int min
   }
   read_confidence(npz, layout, result, progress);
   apply_mask(npz, layout, result);
-  if (std::ranges::count(all.lost, false) > 0) {
+  const bool any_placed = std::ranges::count(all.lost, false) > 0;
+  if (any_placed) {
     drop_invalid_pixels(npz.name(), all.lost, result, progress);
   }
   internal::drop_strays(npz.name(), result, progress);
   internal::verify_poses(npz, layout, result, progress);
   read_colors(npz, layout, result, progress);
-  internal::move_near(npz, layout, result, progress);
+  if (any_placed) internal::move_near(npz, layout, result, progress);
   drop_lost_frames(npz.name(), all.lost, min_frames, result, progress);
   check_consistent(result);
   return result;

@@ -17,12 +17,12 @@ struct PredictionLimits {
 // Reads one epoch. Depth that is NaN, infinite or negative, and depth whose confidence is not
 // a number, becomes 0 (no depth), with one notice; so does depth that is no part of the scene
 // (scene/stray_depths.h); frames without any depth are named in a notice. Frames whose pose or
-// intrinsics are not finite are left out and named (Reconstruction::left_out); intrinsics of another
-// picture size are refused. Where the file's origin is far from the scene the frame is a local one
-// (scene/local_frame.h).
-// Where the file has world points, poses and depth are checked against them, because the same key
-// means opposite poses in different programs; a file that contradicts itself is refused.
-// Throws Error{kInput} for anything else that is not as docs/formats.md says.
+// intrinsics are not finite are left out and named (Reconstruction::left_out); intrinsics of
+// another picture size are refused. Where the file's origin is far from the scene the frame is a
+// local one (scene/local_frame.h). Where the file has world points, poses and depth are checked
+// against them, because the same key means opposite poses in different programs; a file that
+// contradicts itself is refused. Throws Error{kInput} for anything else that is not as
+// docs/formats.md says.
 Reconstruction read_reconstruction(const std::filesystem::path& path, ProgressSink& progress,
                                    const PredictionLimits& limits = {});
 

@@ -141,7 +141,7 @@ WeightFile open_weight_file(const std::filesystem::path& given) try {
   remove_wrappers(file);
   return file;
 } catch (...) {
-  rethrow_naming(path);
+  rethrow_naming(given);
 }
 
 }  // namespace vggtcd

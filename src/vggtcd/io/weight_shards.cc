@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/io/file_system.h"
 #include "vggtcd/io/json_file.h"
 #include "vggtcd/io/mapped_file.h"
 #include "vggtcd/io/quote.h"
@@ -40,6 +41,7 @@ bool is_plain(const std::string& name) {
 // behind the length.
 bool may_be_index(const fs::path& path) {
   constexpr size_t kMaxBytes = 100'000'000;
+  if (!is_file(path)) return false;
   const MappedFile file(path);
   const std::string_view text(reinterpret_cast<const char*>(file.bytes().data()),
                               file.bytes().size());

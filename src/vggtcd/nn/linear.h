@@ -54,7 +54,8 @@ class Linear {
   Linear(Linear&&) noexcept;
   Linear& operator=(Linear&&) noexcept;
 
-  // x [rows, in] of type compute, y [rows, out] of type output; 1 <= rows <= kRowBlock.
+  // x [rows, in] of type compute, y [rows, out] of type output; 1 <= rows <= kRowBlock. Rows in f32
+  // on AVX-512 have no gaps between them: Error{kInternal} where oneDNN has no kernel for the gap.
   void run(int64_t rows, const Rows& x, const Rows& y) const;
 
   int64_t in() const;

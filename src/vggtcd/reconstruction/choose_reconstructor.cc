@@ -47,7 +47,7 @@ std::filesystem::path require_weights(const std::string& given) {
                 "~/.local/share/vggt-cd/model.safetensors; {}",
                 kWithoutWeights);
   }
-  if (!exists_at(weights)) {
+  if (!is_file(weights) && !is_folder(weights)) {
     throw_error(ErrorCode::kWeights, "{}{}: expected network weights, found {}; {}",
                 given.empty() ? "VGGTCD_WEIGHTS: " : "", weights, what_stands_at(weights),
                 kWithoutWeights);

@@ -121,9 +121,7 @@ class Colmap {
                 "stages are kept: run it again, with more memory or fewer photos (--frames)",
                 command, end.in_words(), log().string());
   }
-  std::uintmax_t log_size() const {
-    return is_file(log()) ? size_of_file(log()) : 0;
-  }
+  std::uintmax_t log_size() const { return is_file(log()) ? size_of_file(log()) : 0; }
   // The only way in which the mapper says that the photos determine no model, in what it wrote
   // behind the first bytes of the log.
   bool found_no_model(const ProgramEnd& end, std::uintmax_t first) const {
