@@ -89,6 +89,15 @@ TEST_P(ParallelFor, NestedLoopsRunSeriallyAndWorkersStayInRange) {
 
 INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, ::testing::Values(1, 2, 5));
 
+// GCC tells by a macro that a sanitizer is on, clang by a feature.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VGGTCD_SANITIZED 1
+#elif defined(__has_feature)
+#define VGGTCD_SANITIZED (__has_feature(address_sanitizer) || __has_feature(thread_sanitizer))
+#else
+#define VGGTCD_SANITIZED 0
+#endif
+
 // With little address space, which stands for any limit: the stacks of a thousand threads take 8
 // GB. Exits with 0 if a loop works on fewer threads than were asked for, but on more than one.
 [[noreturn]] void work_where_threads_are_short() {
@@ -110,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(Threads, ParallelFor, ::testing::Values(1, 2, 5));
 }
 
 TEST(StartThreads, GoesOnWithThoseThatTheSystemGives) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if VGGTCD_SANITIZED
   GTEST_SKIP() << "a sanitizer needs its address space";
 #endif
   GTEST_FLAG_SET(death_test_style, "threadsafe");
