@@ -69,7 +69,8 @@ TEST(RenderOverlay, EnlargesThinFramesWithinABound) {
     const Image image = render_overlay(rgb, score, height, 1, {1.0, 2.0});
     const int zoom = overlay_zoom(1, height);
     EXPECT_GE(zoom, 1);
-    EXPECT_LE(image.rgb.size(), 3u * 724 * (std::max(4096, height) + 34)) << height;
+    EXPECT_LE(image.rgb.size(), size_t{3} * 724 * static_cast<size_t>(std::max(4096, height) + 34))
+        << height;
     EXPECT_EQ(image.width, 2 * zoom + 4);
   }
   EXPECT_EQ(overlay_zoom(98, 174), 4);  // photos as they are: by their width
