@@ -21,7 +21,6 @@ import sys
 import tempfile
 import time
 
-TIMED = ("summary.json", "report.html", ".vggt-cd-results")  # they hold times, or hashes of what holds times
 FOREIGN = {
     "notes.txt": b"measured on site: 2.40 m\n",
     ".hidden": b"of a file manager",
@@ -33,13 +32,13 @@ FOREIGN = {
 }
 
 
-def content(out, timed=False):
-    """The files of OUT by name (not .stages); of those that hold times only that they are there."""
+def content(out):
+    """The files of OUT by name (not .stages)."""
     files = {}
     for path in sorted(p for p in out.rglob("*") if p.is_file()):
         name = str(path.relative_to(out))
         if not name.startswith(".stages/"):
-            files[name] = path.read_bytes() if timed or name not in TIMED else b"(times)"
+            files[name] = path.read_bytes()
     return files
 
 

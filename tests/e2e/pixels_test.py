@@ -43,17 +43,8 @@ def scores(out, truth):
 
 
 def content(out):
-    """Every file of the results by its name; times, and where the files lie, are taken out."""
-    files = {}
-    for path in sorted(p for p in out.rglob("*") if p.is_file()):
-        name = str(path.relative_to(out))
-        if name == "summary.json":
-            summary = json.loads(path.read_text())
-            del summary["stages"]
-            files[name] = json.dumps(summary)
-        elif name not in ("report.html", ".vggt-cd-results"):  # shows the times, too; hashes of both
-            files[name] = path.read_bytes()
-    return files
+    """Every file of the results by its name."""
+    return {str(path.relative_to(out)): path.read_bytes() for path in sorted(out.rglob("*")) if path.is_file()}
 
 
 def kill_at(arguments, wanted):

@@ -24,7 +24,7 @@ std::string safetensors(const std::string& header, const std::string& data) {
 
 // A picture of each format, with EXIF that turns it where the format has a place for it.
 void write_pictures(const fs::path& folder) {
-  cv::Mat picture(24, 32, CV_8UC4);
+  cv::Mat picture(32, 40, CV_8UC4);  // JPEG 2000 wants 32 pixels for its six resolutions
   cv::RNG(1).fill(picture, cv::RNG::UNIFORM, 0, 256);
   cv::Mat color;
   cv::extractChannel(picture, color, 0);

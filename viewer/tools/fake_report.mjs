@@ -231,7 +231,6 @@ export function fakeReport({ points = 200000, photos = 12, width = 320, seed = 1
       explanation: 'Refined: the median residual fell from 0.0192 to 0.0071 over 61204 static points.',
       median_residual_coarse_u: 0.0192, median_residual_fine_u: 0.0071 },
     options: { method: 'paper', coarse: { max_correspondences: 5000, seed: 0 }, fine: { grid_resolution: 200, static_factor: 3 } },
-    stages: [{ name: 'read', seconds: 0.41 }, { name: 'coarse', seconds: 0.22 }, { name: 'fine', seconds: 0.9 }, { name: 'change', seconds: 2.31 }, { name: 'write', seconds: 1.2 }],
     ...summary }, blocks };
 }
 

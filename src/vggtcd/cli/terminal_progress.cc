@@ -172,7 +172,10 @@ class JsonLines : public TimedProgress {
     write({{"event", "stage_advanced"}, {"stage", stage}, {"fraction", fraction}});
   }
   void show_finished(std::string_view stage, double seconds) override {
-    write({{"event", "stage_finished"}, {"stage", stage}, {"seconds", seconds}});
+    write({{"event", "stage_finished"},
+           {"stage", stage},
+           {"seconds", seconds},
+           {"peak_memory_bytes", peak_memory_bytes()}});
   }
 
  private:

@@ -304,7 +304,6 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   summary["alignment"] = alignment_json(outcome.alignment);
   if (outcome.metric) summary["metric"] = metric_json(*outcome.metric);
   summary["change"] = change_json(changes, frame);
-  summary["stages"] = stages_json(log);
   write_json_file(aside / "summary.json", summary);
 
   // 6. Show: the page is made from the files above, as `vggt-cd view` makes it, so the two agree.
@@ -348,7 +347,6 @@ RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOption
   });
   summary["options"] = Json{{"alignment", options_to_json(options)}};
   summary["alignment"] = alignment_json(alignment);
-  summary["stages"] = stages_json(log);
   write_json_file(directory.path() / "summary.json", summary);
   directory.commit();
   return outcome;

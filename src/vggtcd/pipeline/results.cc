@@ -216,16 +216,6 @@ Json explanation_json(const PixelExplanation& why, const ResultFrame& frame) {
   return frame.renamed(json);
 }
 
-Json stages_json(const StageLog& log) {
-  Json json = Json::array();
-  for (const StageRecord& record : log.records()) {
-    json.push_back({{"name", record.name},
-                    {"seconds", record.seconds},
-                    {"peak_memory_bytes", record.peak_memory_bytes}});
-  }
-  return json;
-}
-
 void write_change_ply(const std::filesystem::path& path, const Reconstruction& epoch,
                       const Sim3& result_from_epoch, const EpochChange& change,
                       const ChangeSet& changes, const StoredAnswers* answers,

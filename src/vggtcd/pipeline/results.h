@@ -30,9 +30,6 @@ Json change_json(const ChangeSet& changes, const ResultFrame& frame);
 // explain.json: which photos voted how for one pixel.
 Json explanation_json(const PixelExplanation& explanation, const ResultFrame& frame);
 
-// The "stages" part.
-Json stages_json(const StageLog& log);
-
 // All functions below write into an existing directory and throw Error{kOutput}. Changes and
 // instances are expressed in the frame of the results already (result_frame.h).
 

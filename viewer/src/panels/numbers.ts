@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How we know: verdict, residuals, trajectories, histogram, times and options, from summary.json.
+// How we know: verdict, residuals, trajectories, histogram and options, from summary.json.
 import { Histogram, trajectories } from '../charts';
 import { changedPixels, edgeValue, type Json, type JsonObject, type Report } from '../data';
 import { h } from '../dom';
@@ -112,27 +112,6 @@ function distances(report: Report, store: Store): HTMLElement {
       h('span', {}, `${number(edgeValue(report, report.levels.count))} ${report.unit}`)), caption);
 }
 
-function times(stages: Json | undefined): HTMLElement | null {
-  const list: { name: string; s: number; memory: number | null }[] = [];
-  const add = (name: string, value: Json): void => {
-    const s = typeof value === 'number' ? value : asNumber(find(value, 'seconds', 'time_s'));
-    if (s !== null) list.push({ name, s, memory: asNumber(find(value, 'peak_memory_bytes', 'peak_bytes')) });
-  };
-  if (Array.isArray(stages)) {
-    stages.forEach((stage) => { if (isObject(stage)) add(String(stage.name ?? stage.stage ?? ''), stage); });
-  } else if (isObject(stages)) {
-    Object.entries(stages).forEach(([name, value]) => add(name, value));
-  }
-  if (list.length === 0) return null;
-  const most = Math.max(...list.map((stage) => stage.s), 1e-9);
-  const total = list.reduce((sum, stage) => sum + stage.s, 0);
-  return card('Time', h('table', { class: 'times' }, h('tbody', {}, ...list.map(({ name, s, memory }) =>
-    h('tr', {}, h('th', { scope: 'row' }, words(name)),
-      h('td', { class: 'bar-cell' }, h('i', { style: `width:${(100 * s) / most}%` })),
-      h('td', {}, seconds(s)), h('td', {}, memory === null ? '' : bytes(memory)))),
-    h('tr', { class: 'total' }, h('th', { scope: 'row' }, 'total'), h('td', {}), h('td', {}, seconds(total)), h('td', {})))));
-}
-
 export function makeNumbers(report: Report, store: Store, onPhoto: (index: number) => void): HTMLElement {
   const plot = trajectories(report, onPhoto);
   const options = find(report.summary, 'options');
@@ -141,7 +120,6 @@ export function makeNumbers(report: Report, store: Store, onPhoto: (index: numbe
     distances(report, store),
     plot ? card('Cameras', plot, h('p', { class: 'muted' },
       'Both walks in the frame of the after epoch, seen along the axis in which they spread least.')) : null,
-    times(find(report.summary, 'stages', 'timing', 'times')),
     isObject(options) ? card('Options', table(options)) : null,
     card('All of summary.json', h('details', {}, h('summary', {}, 'Show'), table(report.summary))),
     h('p', { class: 'muted made-by' }, `Made by ${report.generator}.`));
