@@ -22,11 +22,16 @@ inline void require(bool condition) {
   if (!condition) std::abort();
 }
 
-// A refusal is one line of a length that a terminal shows, and blames the input.
-inline void check_refusal(const Error& error) {
-  require(error.code() == ErrorCode::kInput);
+// One line of a length that a terminal shows.
+inline void check_sentence(const Error& error) {
   require(std::strchr(error.what(), '\n') == nullptr);
   require(std::strlen(error.what()) < 1000);
+}
+
+// A refusal that blames the input.
+inline void check_refusal(const Error& error) {
+  require(error.code() == ErrorCode::kInput);
+  check_sentence(error);
 }
 
 // A directory of this process in memory where the system has one, removed when it ends.

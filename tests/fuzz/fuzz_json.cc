@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Fuzz target: any bytes as a JSON file: as it is, as a similarity, and as options.
+// Fuzz target: any bytes as a JSON file: as it is, as a similarity, as options, and as the index of
+// the shards of a checkpoint.
 #include "tests/fuzz/fuzz_files.h"
 #include "vggtcd/io/sim3_file.h"
+#include "vggtcd/io/weight_shards.h"
 
 namespace {
 
@@ -74,5 +76,19 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     const Eigen::Matrix3d product = similarity.rotation * similarity.rotation.transpose();
     require((product - Eigen::Matrix3d::Identity()).norm() < 1e-9);
   });
+  try {
+    const auto index = vggtcd::read_shard_index(path);
+    if (index) {
+      require(!index->files.empty());
+      for (const std::string& file : index->files) {
+        require(!file.empty() && file.find('/') == std::string::npos && file != "..");
+      }
+      for (const auto& [tensor, file] : index->tensors) require(file < index->files.size());
+    }
+  } catch (const vggtcd::Error& error) {
+    require(error.code() == vggtcd::ErrorCode::kWeights ||
+            error.code() == vggtcd::ErrorCode::kInput);
+    vggtcd::fuzz::check_sentence(error);
+  }
   return 0;
 }

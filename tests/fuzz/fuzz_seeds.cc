@@ -109,6 +109,23 @@ void write_json_seeds(const fs::path& folder) {
   write(folder / "options",
         R"({"flag":true,"many":-3,"seed":18446744073709551615,"share":1e308,"length":0.1,)"
         R"("name":"\u00e9\n","kind":"other","inner":{"whole":2}})");
+  write(folder / "index",
+        R"({"metadata":{"total_size":8},"weight_map":{"a.weight":"model-1-of-2.safetensors",)"
+        R"("b":"model-2-of-2.safetensors"}})");
+}
+
+// All keys, in the layouts of VGGT and of Depth Anything 3; one number is replaced by one third.
+void write_prediction_seeds(const fs::path& folder) {
+  const std::string edit = std::string("\2\5\0", 3) + "\x3f\xd5\x55\x55\x55\x55\x55\x55";
+  write(folder / "vggt", "\xe3\x36" + part("photo.jpg") + edit);
+  write(folder / "da3", "\x3a\x36" + part("") + edit);
+  write(folder / "square", "\x47\x36" + part("") + edit);
+}
+
+void write_result_list_seeds(const fs::path& folder) {
+  write(folder / "results",
+        "vggt-cd results 1\n00000000000000ff 12 report.html\n0123456789abcdef 3 a/b \\n c.png\n");
+  write(folder / "old", "Written by vggt-cd, which may replace this directory.\n");
 }
 
 }  // namespace
@@ -141,6 +158,8 @@ int main(int argc, char** argv) {
   write_colmap_seeds(folder / "fuzz_colmap");
   write_json_seeds(folder / "fuzz_json");
   write_ply_seeds(folder / "fuzz_ply");
+  write_prediction_seeds(folder / "fuzz_predictions");
+  write_result_list_seeds(folder / "fuzz_result_list");
   write_table_seeds(folder / "fuzz_tables");
   return 0;
 }
