@@ -226,26 +226,21 @@ Contender xnnpack(Problem& problem) {
 std::vector<Contender> make_contenders(Problem& problem, bool bf16, Onednn& onednn,
                                        const Blis& blis) {
   std::vector<Contender> all;
-  const DType f32 = DType::kF32, narrow = DType::kBF16;
-  const ProductTypes types = bf16 ? ProductTypes{narrow, narrow} : ProductTypes{};
-  const double rounding = bf16 ? kBf16 : kF32;
-  // From AVX-512 on make_product takes oneDNN's, and the kernel of our own is a line besides.
+  const ProductTypes types = bf16 ? ProductTypes{DType::kBF16, DType::kBF16} : ProductTypes{};
+  const auto add = [&](const char* name, double rounding, const ProductTypes& of, bool is_onednn,
+                       MakeProduct make) {
+    all.push_back(in_blocks(name, problem, of, rounding, make));
+    all.back().onednn = is_onednn;
+  };
+  // What make_product takes; what it does not take is a line besides.
   const bool own = cpu_level() == CpuLevel::kAvx2;
-  if (!own) {
-    all.push_back(
-        in_blocks("oneDNN matmul, 128 rows (ours)", problem, types, rounding, make_product));
-    all.back().onednn = true;
-  }
+  add(own ? "ours: panels, f32 weights" : "ours: oneDNN matmul, 128 rows", bf16 ? kBf16 : kF32,
+      types, !own, make_product);
   if (!bf16) {
-    all.push_back(in_blocks(own ? "panels, f32 weights (ours)" : "panels, f32 weights", problem,
-                            types, rounding, make_panel_product));
-    all.push_back(in_blocks("panels, bf16 weights (ours)", problem, {f32, narrow}, kBf16Weights,
-                            make_product));
-  }
-  if (own) {
-    all.push_back(
-        in_blocks("oneDNN matmul, 128 rows", problem, types, rounding, make_onednn_product));
-    all.back().onednn = true;
+    add("ours: panels, bf16 weights", kBf16Weights, {DType::kF32, DType::kBF16}, false,
+        make_product);
+    add(own ? "oneDNN matmul, 128 rows" : "panels, f32 weights", kF32, types, own,
+        own ? make_onednn_product : make_panel_product);
   }
   add_onednn(all, problem, bf16, onednn);
   if (bf16) return all;
@@ -329,8 +324,10 @@ int main(int argc, char** argv) {
   std::vector<int64_t> rows{2082, 10410};  // tokens of 2 and of 10 views of 518 x 392
   int rounds = 7;
   app.add_option("kinds", kinds)->check(CLI::IsMember({"f32", "bf16"}));
-  app.add_option("--rows", rows, "numbers of rows, a table each")->delimiter(',');
-  app.add_option("--rounds", rounds, "the best one counts")->check(CLI::PositiveNumber);
+  app.add_option("--rows", rows, "numbers of rows, a table each")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1 << 20));
+  app.add_option("--rounds", rounds, "the best one counts")->check(CLI::Range(1, 1000));
   CLI11_PARSE(app, argc, argv);
   try {
     check(cpu_level() >= CpuLevel::kAvx2, "product_bench: needs AVX2");
@@ -347,6 +344,7 @@ int main(int argc, char** argv) {
     fmt::print("XNNPACK left out: not found when this was built\n");
 #endif
     for (const std::string& kind : kinds) {
+      check(kind == "f32" || bf16_is_fast(), "product_bench: bf16 needs AVX512_BF16");
       for (const int64_t count : rows) {
         bench::run(count, kind == "bf16", rounds, onednn, blis);
       }
