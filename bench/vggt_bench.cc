@@ -3,7 +3,7 @@
 // rate on the network's own products, measured in the same run, would need for its operations.
 //
 //   vggt_bench [--views N,N,..] [--size WIDTHxHEIGHT] [--precision f32|bf16_weights|bf16]
-//   [--weights FILE] [--points]          VGGTCD_ISA chooses the instruction set
+//   [--weights FILE] [--points] [--answer OUT.npz]     VGGTCD_ISA chooses the instruction set
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -15,6 +15,7 @@
 #include "vggtcd/core/cpu_features.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/core/timer.h"
+#include "vggtcd/vggt/batch_file.h"
 #include "vggtcd/vggt/model.h"
 
 namespace {
@@ -63,13 +64,12 @@ void print_stages(const Prediction& prediction, const VggtCost& cost, double tot
   }
 }
 
-void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool points,
-         double gemm_gflops) {
-  const ImageBatch images = make_images(frames, height, width);
+Prediction run(const Vggt& model, const ImageBatch& images, bool points, double gemm_gflops) {
+  const auto [frames, height, width] = std::array{images.frames, images.height, images.width};
   const VggtRun shape{frames, height, width, model.precision(), true, points};
   reset_peak_memory();
   const Timer timer;
-  const Prediction prediction = model.reconstruct(images);
+  Prediction prediction = model.reconstruct(images);
   const double total_s = timer.seconds();
   const int64_t peak = peak_memory_bytes();
   const VggtCost cost = cost_of(model.config(), shape);
@@ -81,6 +81,7 @@ void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool 
              total_s / (cost.total_flop() * 1e-9 / gemm_gflops), gemm_gflops);
   fmt::print("peak memory {:.2f} GB; planned {:.2f} + {:.2f} GB\n", gigabytes(peak),
              gigabytes(planned.weights), gigabytes(planned.activations));
+  return prediction;
 }
 
 }  // namespace
@@ -88,7 +89,7 @@ void run(const Vggt& model, int64_t frames, int64_t height, int64_t width, bool 
 int main(int argc, char** argv) {
   CLI::App app("VGGT-1B on synthetic photos against the rate of oneDNN's matrix product");
   std::vector<int64_t> views{10};
-  std::string size = "518x392", asked = "auto", weights;
+  std::string size = "518x392", asked = "auto", weights, answer;
   bool points = false;
   app.add_option("--views", views, "numbers of photos, one pass each")->delimiter(',');
   app.add_option("--size", size, "WIDTHxHEIGHT of a photo, multiples of 14");
@@ -96,6 +97,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"auto", "f32", "bf16_weights", "bf16"}));
   app.add_option("--weights", weights, "a weights file instead of the recipe; its load is timed");
   app.add_flag("--points", points, "the point head too");
+  app.add_option("--answer", answer, "the prediction file to write, of the last pass");
   CLI11_PARSE(app, argc, argv);
   try {
     Precision precision = Precision::kAuto;
@@ -115,7 +117,9 @@ int main(int argc, char** argv) {
     fmt::print("precision {} on {}, {} threads\n", enum_to_string(precision),
                enum_to_string(cpu_level()), num_threads());
     for (const int64_t frames : views) {
-      run(model, frames, height, width, points, bench::best_gflops(rates));
+      const ImageBatch images = make_images(frames, height, width);
+      const Prediction prediction = run(model, images, points, bench::best_gflops(rates));
+      if (!answer.empty()) write_prediction(answer, images, prediction);
     }
   } catch (const std::exception& error) {
     fmt::print(stderr, "vggt_bench: {}\n", error.what());
