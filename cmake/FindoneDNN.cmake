@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-# Defines oneDNN::dnnl, version 2.6 and later 2.x. Debian 12's own dnnl-config.cmake also demands
-# OpenCL, which only its GPU half needs. libgomp is the OpenMP that Debian's oneDNN runs on;
-# nn/linear.cc tells it to use one thread.
+# Defines oneDNN::dnnl, version 2.6 and later, and 3.x. Debian 12's own dnnl-config.cmake also
+# demands OpenCL, which only its GPU half needs. libgomp is the OpenMP that Debian's oneDNN runs on;
+# nn/onednn_product.cc tells it to use one thread.
 include(FindPackageHandleStandardArgs)
 find_path(oneDNN_INCLUDE_DIR dnnl.hpp)
 find_library(oneDNN_LIBRARY dnnl)
