@@ -154,5 +154,19 @@ TEST_F(Results, OfOtherPhotosAreRefused) {
   EXPECT_INPUT_ERROR(score_results(results_, truth_), "not those of the 3 photos");
 }
 
+// The same number of values in another shape: another pixel would be looked up.
+TEST_F(Results, ArraysOfUnequalShapesAreRefused) {
+  write_results(false);
+  const std::vector<float> scores(16, 1);
+  const std::vector<uint8_t> changed(16, 1);
+  NpzWriter change(results_ / "change.npz");
+  for (const std::string epoch : {"_t1", "_t2"}) {
+    change.add<float>("score" + epoch, {2, 2, 4}, scores);
+    change.add_mask("changed" + epoch, {2, 4, 2}, changed);
+  }
+  change.finish();
+  EXPECT_INPUT_ERROR(score_results(results_, truth_), "changed_t1: expected shape [2, 2, 4]");
+}
+
 }  // namespace
 }  // namespace vggtcd
