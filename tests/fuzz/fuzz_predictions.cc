@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fuzz target: a sound prediction file whose numbers the input replaces: a reconstruction that is
 // what scene/reconstruction.h promises, or one line. Also as a joint pass over itself.
+#include <bit>
 #include <cmath>
 #include <vector>
 
@@ -44,9 +45,7 @@ struct Arrays {
 double number(vggtcd::fuzz::FuzzInput& input) {
   uint64_t bits = 0;
   for (int i = 0; i < 8; ++i) bits = bits << 8 | input.byte();
-  double value = 0;
-  std::memcpy(&value, &bits, sizeof value);
-  return value;
+  return std::bit_cast<double>(bits);
 }
 
 void check(const vggtcd::Reconstruction& epoch) {
