@@ -76,6 +76,10 @@ class Detect(unittest.TestCase):
         sim3 = json.loads((out / "sim3.json").read_text())
         self.assertEqual(sim3["chosen"], "robust")
         self.assertEqual(sim3["scale"], sim3["robust"]["scale"])
+        # Cameras and surfaces have a similarity each; with one method that has one, it is the same.
+        self.assertNotEqual(sim3["surfaces"]["translation"], sim3["translation"])
+        paper = json.loads((self.out / "sim3.json").read_text())
+        self.assertEqual(paper["surfaces"]["translation"], paper["translation"])
         # The coarse stage is the paper's in either case.
         self.assertEqual(sim3["coarse"]["scale"],
                          json.loads((self.out / "sim3.json").read_text())["coarse"]["scale"])
@@ -91,6 +95,22 @@ class Detect(unittest.TestCase):
             np.testing.assert_array_equal(change["changed_" + epoch], label == changed_label)
             self.assertGreater((label == 3).sum(), 0)
         self.assertNotIn("label_t1", np.load(self.out / "change.npz"))
+
+    def test_the_sky_is_no_surface_and_nothing_changes_there(self):
+        scene, out = self.root / "sky", self.root / "sky_results"
+        self.assertEqual(run("synthesize", scene, "--scene", "barbecue", "--seed", "3", "--frames", "8", "--width", "160",
+                             "--photo-scale", "1", "--samples", "1", "--no-photos", "--no-wat").returncode, 0)
+        done = run("detect", scene / "t1.npz", scene / "t2.npz", "--joint", scene / "joint.npz", "-o", out, "--no-page",
+                   "--no-overlays")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        inputs = json.loads((out / "summary.json").read_text())["inputs"]
+        change, truth = np.load(out / "change.npz"), np.load(scene / "truth.npz")
+        for epoch, name in (("t1", "before"), ("t2", "after")):
+            sky = truth["instance_" + epoch] == 0
+            self.assertGreater(sky.mean(), 0.02)
+            self.assertAlmostEqual(inputs[name]["sky_share"], sky.mean(), delta=0.02)
+            self.assertLess(change["changed_" + epoch][sky].mean(), 0.01)
+            self.assertGreater((change["label_" + epoch][sky] == 255).mean(), 0.95)
 
     def test_sim3_maps_the_points_of_t1_onto_the_ply(self):
         sim3 = json.loads((self.out / "sim3.json").read_text())

@@ -94,7 +94,7 @@ class Pixels(unittest.TestCase):
     def test_killed_after_every_stage_it_goes_on_to_the_same_bytes(self):
         out = self.root / "killed"
         kept = ["matching", "structure from motion", "before: depth", "after: depth"]
-        stages = ["read photos", "key points", *kept, "read predictions", "coarse alignment", "fine alignment",
+        stages = ["read photos", "key points", *kept, "read predictions", "coarse alignment",
                   "change detection", "free-space votes", "changed things", "write results"]
         for number, stage in enumerate(stages):
             finished = self.kill_after(stage, out)

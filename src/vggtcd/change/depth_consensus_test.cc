@@ -23,7 +23,7 @@ Reconstruction walk(int frames) {
 }
 
 DepthCorrection consensus(const Reconstruction& r, const Sim3& t2_from_epoch = {}) {
-  return depth_consensus(make_witness(r, t2_from_epoch, 0), t2_from_epoch, 0,
+  return depth_consensus(make_witness(r, t2_from_epoch, 0, 1), t2_from_epoch, 0,
                          kExtent * t2_from_epoch.scale, {});
 }
 

@@ -61,7 +61,7 @@ EpochFreeSpace answer_epoch(const Inquiry& inquiry, const VoteGrid& grid, Change
   const Reconstruction& judged = inquiry.judged();
   EpochFreeSpace epoch;
   epoch.label.resize(judged.num_pixels());
-  std::vector<std::vector<float>> confidence(judged.views.size());
+  std::vector<std::vector<float>> confidence(judged.views.size()), evidence(judged.views.size());
   parallel_for(judged.num_frames(), 1, [&](int64_t frame, int64_t) {
     const PhotoAnswers answers =
         answer_photo(inquiry, static_cast<int>(frame), grid, changed, scale, options);
@@ -69,14 +69,16 @@ EpochFreeSpace answer_epoch(const Inquiry& inquiry, const VoteGrid& grid, Change
     for (size_t i = 0; i < answers.label.size(); ++i) {
       if (answers.label[i] == changed) {
         confidence[static_cast<size_t>(frame)].push_back(answers.confidence[i]);
+        evidence[static_cast<size_t>(frame)].push_back(answers.evidence[i]);
       }
     }
     if (sink) sink(static_cast<int>(frame), answers);
   });
-  for (const auto& of_frame : confidence) {
-    epoch.changed_confidence.insert(epoch.changed_confidence.end(), of_frame.begin(),
-                                    of_frame.end());
-  }
+  const auto join = [](const std::vector<std::vector<float>>& frames, std::vector<float>& all) {
+    for (const auto& of_frame : frames) all.insert(all.end(), of_frame.begin(), of_frame.end());
+  };
+  join(confidence, epoch.changed_confidence);
+  join(evidence, epoch.changed_evidence);
   return epoch;
 }
 
@@ -92,8 +94,9 @@ FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstru
   result.scene_extent_u = extent_of(after);
   const float min_confidence_t1 = confidence_percentile(before, 100 * options.min_confidence_rank);
   const float min_confidence_t2 = confidence_percentile(after, 100 * options.min_confidence_rank);
-  Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1);
-  Witness witness_t2 = make_witness(after, {}, min_confidence_t2);
+  const double open_gap_u = result.scene_extent_u;
+  Witness witness_t1 = make_witness(before, t2_from_t1, min_confidence_t1, open_gap_u);
+  Witness witness_t2 = make_witness(after, {}, min_confidence_t2, open_gap_u);
   if (options.consensus) {
     witness_t1.correction =
         depth_consensus(witness_t1, t2_from_t1, min_confidence_t1, result.scene_extent_u, {});
@@ -147,7 +150,10 @@ void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes) {
     }
     epoch.label = std::move(votes.label);
     epoch.changed_confidence = std::move(votes.changed_confidence);
-    check(std::ssize(epoch.changed_confidence) == epoch.changed, "a confidence for every change");
+    epoch.changed_evidence = std::move(votes.changed_evidence);
+    check(std::ssize(epoch.changed_confidence) == epoch.changed &&
+              std::ssize(epoch.changed_evidence) == epoch.changed,
+          "a confidence and evidence for every change");
   };
   decide(free_space.t1, changes.t1);
   decide(free_space.t2, changes.t2);

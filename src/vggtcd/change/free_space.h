@@ -22,8 +22,9 @@ namespace vggtcd {
 
 // The testimony about one epoch: what is needed to go on. All else is handed over photo by photo.
 struct EpochFreeSpace {
-  std::vector<ChangeLabel> label;         // [S, H, W]
-  std::vector<float> changed_confidence;  // of the pixels called changed alone, in pixel order
+  std::vector<ChangeLabel> label;  // [S, H, W]
+  // Of the pixels called changed alone, in pixel order; as in PhotoAnswers.
+  std::vector<float> changed_confidence, changed_evidence;
 };
 
 struct FreeSpaceChange {
@@ -54,10 +55,10 @@ void decide_by_labels(FreeSpaceChange free_space, ChangeSet& changes);
 //   lo - z > t: the photo looks through X, a vote for change with gap lo - z;
 //   z - hi > t: X is hidden behind something, no vote;
 //   otherwise the photo sees X's surface, a vote against.
-// Near photos weigh more, as 1 / z. Votes are summed over the points of a voxel, so photos of one
-// epoch agree, and over the surface around a pixel. registration: that of
-// t2_from_t1, see level_of_detection.
-// question: a pixel whose votes are kept in `explanation`.
+// A photo that shows the open sky around the projection looks through X too, by the extent of the
+// scene. Near photos weigh more, as 1 / z. Votes are summed over the points of a voxel, so photos
+// of one epoch agree, and over the surface around a pixel. registration: that of t2_from_t1, see
+// level_of_detection. question: a pixel whose votes are kept in `explanation`.
 FreeSpaceChange free_space_changes(const Reconstruction& before, const Reconstruction& after,
                                    const Sim3& t2_from_t1, const FreeSpaceOptions& options,
                                    const PointVariance& registration = {},

@@ -12,6 +12,7 @@
 #include "vggtcd/change/witness.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/scene/point_cloud.h"
+#include "vggtcd/scene/sky.h"
 #include "vggtcd/scene/view_overlap.h"
 
 namespace vggtcd {
@@ -79,6 +80,71 @@ TEST(FreeSpaceChanges, ABoxThatAppearedIsAddedAndTheRestUnchanged) {
   ASSERT_GT(box, 500);
   EXPECT_GT(box_added, 0.97 * box);
   EXPECT_LT(plane_added, 0.01 * plane);
+}
+
+// Nothing is left of the plane to the right of x = -0.5: the photos show what `sky` says.
+void open_to_the_right(Reconstruction& r, const Sim3& frame_from_scene, uint8_t sky) {
+  r.sky.assign(r.num_pixels(), kNoSky);
+  for (size_t i = 0; i < r.num_pixels(); ++i) {
+    const Eigen::Vector3d x =
+        frame_from_scene.inverse() * unproject_pixel(r, static_cast<uint32_t>(i)).cast<double>();
+    if (x.x() < -0.5 || x.z() < 4.99) continue;  // the plane to the left, or the box
+    r.sky[i] = sky;
+    r.depth[i] = 0;
+  }
+}
+
+TEST(FreeSpaceChanges, TheSkySeenThroughABoxTestifiesThatItIsGone) {
+  Reconstruction before = reconstruct(scene(box_relief, 0), Sim3{});
+  open_to_the_right(before, {}, kOpenSky);
+  for (const uint8_t sky : {kOpenSky, kSky}) {
+    Reconstruction after = reconstruct(scene(flat_relief, 0.1), kT2FromT1);
+    open_to_the_right(after, kT2FromT1, sky);
+    const Answers change = all_answers(before, after);
+    int box = 0, removed = 0, left = 0, left_removed = 0;
+    for (size_t i = 0; i < before.num_pixels(); ++i) {
+      const ChangeLabel label = change.t1.label[i];
+      if (before.depth[i] == 0) {
+        EXPECT_EQ(label, ChangeLabel::kNoEvidence);
+        continue;
+      }
+      const bool on_box = unproject_pixel(before, static_cast<uint32_t>(i)).z() < 4.99f;
+      const bool is_removed = label == ChangeLabel::kRemoved;
+      (on_box ? box : left) += 1;
+      (on_box ? removed : left_removed) += is_removed ? 1 : 0;
+      if (is_removed) {
+        EXPECT_NEAR(change.t1.gap[i], change.change.scene_extent_u,
+                    0.5 * change.change.scene_extent_u);
+      }
+    }
+    ASSERT_GT(box, 300);
+    ASSERT_GT(left, 500);
+    EXPECT_EQ(left_removed, 0);
+    // A sky that may be a white ceiling says nothing.
+    if (sky == kOpenSky) {
+      EXPECT_GT(removed, 0.9 * box);
+    } else {
+      EXPECT_EQ(removed, 0);
+    }
+  }
+}
+
+TEST(MakeWitness, TheSkyTestifiesAwayFromItsBorderOnly) {
+  Reconstruction r = reconstruct(scene(flat_relief, 0), Sim3{});
+  r.sky.assign(r.num_pixels(), kNoSky);
+  for (size_t i = 0; i < r.pixels_per_frame(); ++i) {
+    if (i % 96 < 48) r.sky[i] = kOpenSky, r.depth[i] = 0;
+  }
+  const Witness witness = make_witness(r, {}, 0, 1);
+  const DepthWindows photo = witness.windows(0);
+  EXPECT_TRUE(photo.open(0, 0));
+  EXPECT_TRUE(photo.open(45, 30));  // two pixels of 96 / 40 are left as a margin
+  EXPECT_FALSE(photo.open(46, 30));
+  EXPECT_FALSE(photo.open(60, 30));
+  EXPECT_FALSE(witness.windows(1).open(0, 0));
+  float near = 0, far = 0;
+  EXPECT_FALSE(photo.read(10, 10, near, far));  // the sky has no depth
+  EXPECT_TRUE(photo.read(60, 30, near, far));
 }
 
 TEST(FreeSpaceChanges, WhatTheBoxHidesIsNotCalledRemoved) {
@@ -207,7 +273,7 @@ TEST(Witness, KeepsTheNearestAndTheFarthestDepthAroundEachPixel) {
   for (int y = 20; y < 25; ++y) {
     for (int x = 30; x < 36; ++x) r.depth[static_cast<size_t>(y * r.width + x)] = 0;
   }
-  const Witness witness = make_witness(r, kT2FromT1, 0);
+  const Witness witness = make_witness(r, kT2FromT1, 0, 1);
   int without = 0;
   for (int v = 0; v < r.height; ++v) {
     for (int u = 0; u < r.width; ++u) {

@@ -78,7 +78,7 @@ class Inquiry {
     const size_t i = static_cast<size_t>(frame);
     for (size_t k = 0; k < views_[i].size(); ++k) {
       const DepthWindows photo = witness_.windows(static_cast<size_t>(views_[i][k]));
-      visit(k, ask(pairs_[i][k], photo, x, tolerance_sigmas));
+      visit(k, ask(pairs_[i][k], photo, x, tolerance_sigmas, witness_.open_gap_u));
     }
   }
 

@@ -10,6 +10,7 @@
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
+#include "vggtcd/scene/sky.h"
 
 namespace vggtcd {
 namespace {
@@ -26,11 +27,14 @@ constexpr double kStepsAcross = 160;       // see photo_step
 constexpr size_t kColorStride = 97;        // every 97th pixel is looked at for the mean colour
 constexpr double kMinRelativeEdge = 1e-3;  // of the longest edge: no box is without thickness
 
-// The depth at a pixel in T2 units; 0: none, or not in the photo.
+// The depth at a pixel in T2 units; 0: none, or not in the photo; infinite in the open sky.
 double depth_at(const PosedView& view, int u, int v) {
   if (u < 0 || v < 0 || u >= view.pinhole.width || v >= view.pinhole.height) return 0;
   const size_t pixel =
       static_cast<size_t>(v) * static_cast<size_t>(view.pinhole.width) + static_cast<size_t>(u);
+  if (!view.sky.empty() && view.sky[pixel] == kOpenSky) {
+    return std::numeric_limits<double>::infinity();
+  }
   return view.depth_scale * static_cast<double>(view.depth[pixel]);
 }
 
@@ -193,7 +197,7 @@ std::vector<PosedView> posed_views(const Reconstruction& epoch, const Sim3& t2_f
   for (int frame = 0; frame < epoch.num_frames(); ++frame) {
     const View& view = epoch.views[static_cast<size_t>(frame)];
     views.push_back({camera_from_new_world(view.camera_from_world, t2_from_epoch), view.pinhole,
-                     t2_from_epoch.scale, epoch.frame_depth(frame)});
+                     t2_from_epoch.scale, epoch.frame_depth(frame), epoch.frame_sky(frame)});
   }
   return views;
 }

@@ -32,6 +32,8 @@ struct PosedView {
   Pinhole pinhole;
   double depth_scale = 1;  // T2 units per unit of the depths
   std::span<const float> depth;
+  std::span<const uint8_t>
+      sky{};  // Reconstruction::sky of the photo; the open sky is infinitely far
 };
 std::vector<PosedView> posed_views(const Reconstruction& epoch, const Sim3& t2_from_epoch);
 

@@ -10,6 +10,7 @@
 
 #include "vggtcd/change/instance_shape.h"
 #include "vggtcd/change/nearest_distance.h"
+#include "vggtcd/change/thing_signs.h"
 #include "vggtcd/core/options.h"
 #include "vggtcd/geometry/sim3.h"
 #include "vggtcd/scene/reconstruction.h"
@@ -22,12 +23,10 @@ struct InstanceOptions {
   double split_density = 0.5;        // of a region's median points per voxel; thinner ones divide
   double min_size_fraction = 0.02;   // longest edge of the box / scene extent; >= 0
   double min_width_fraction = 0.01;  // its second longest edge; slivers along edges are noise
-  double min_fill = 0.5;             // voxels / those that cover the largest face of the box; >= 0
+  double min_fill = 0.2;             // voxels / those that cover the largest face of the box; >= 0
   int min_instance_points = 50;      // >= 1
-  int min_photos = 3;                // of its epoch that show it; >= 1
-  double max_contradiction = 0.55;   // of its own epoch's photos, share that sees through it
-  double min_corroboration = 0.5;    // of those that see its surface, share that call it changed
-  double min_confidence = 0.65;      // mean over its pixels, where votes give one; [0, 1]
+  int min_photos = 2;                // of its epoch that show it; >= 1
+  double min_confidence = 0.5;       // that it is a thing (thing_signs.h); [0, 1]
   double move_shape_ratio = 0.6;     // of the box edges of a pair, smaller / larger; (0, 1]
   double move_color_overlap = 0.6;   // common part of the colour histograms of a pair; (0, 1]
 
@@ -51,15 +50,9 @@ struct InstanceOptions {
     field("min_instance_points", self.min_instance_points,
           "Instances: things with fewer points are left out.");
     field("min_photos", self.min_photos, "Instances: things in fewer photos are left out.");
-    field(
-        "max_contradiction", self.max_contradiction,
-        "Instances: things that more than this share of the photos of their own epoch see through "
-        "are left out.");
-    field("min_corroboration", self.min_corroboration,
-          "Instances: things that less than this share of the photos of their own epoch that see "
-          "their surface call changed are left out.");
     field("min_confidence", self.min_confidence,
-          "Instances: things of which the votes are less sure on average are left out.");
+          "Instances: regions that are less likely to be things that changed are left out; their "
+          "number is reported.");
     field("move_shape_ratio", self.move_shape_ratio,
           "Instances: a removed and an added thing are one that moved if the edges of their boxes "
           "agree to this ratio");
@@ -88,9 +81,10 @@ struct InstancePart {
   double surface_u2 = 0;       // that the photos see
   double surface_sigma_u2 = 0;
   int64_t pixels = 0;
-  double confidence = 0;              // mean over its pixels
+  double confidence = 0;              // thing_probability of its signs
   std::vector<InstancePhoto> photos;  // at most 3, the most evidence first
   ColorHistogram colors{};
+  ThingSigns signs;
 };
 
 struct ChangeInstance {
@@ -107,12 +101,16 @@ struct ChangeInstance {
 struct ChangeInstances {
   std::vector<ChangeInstance> instances;  // highest rank first; instance i has id i + 1
   std::vector<int32_t> id_t1, id_t2;      // [S, H, W] of either epoch; 0: belongs to none
+  // Regions with a body in some photo and a confidence of 0.3 or more that are no things for their
+  // confidence alone.
+  int unsure = 0;
+  double unsure_confidence = 0;  // the largest of theirs
   double voxel_size_u = 0;
 };
 
 // Changed points (by label where there are labels, else by distance; T1's are removed, T2's added)
 // in touching voxels are one region, divided where it is thin (split_region.h); each part that is
-// large, dense and corroborated enough is an instance. A point is uncertain by
+// large enough and likely to be a thing (thing_signs.h) is an instance. A point is uncertain by
 // position_sigma of its depth, or by a voxel, whichever is more. A removed and an added instance
 // that agree in shape and colour are one that moved, best agreement first. A thing that moved by
 // less than its own size leaves two partial regions and is usually not recognised as moved.

@@ -155,28 +155,48 @@ TEST(FindInstances, ThingsBelowTheMinimumSizeAreLeftOut) {
 TEST(FindInstances, ThingsOfWhichTheVotesAreUnsureAreLeftOut) {
   Case c = make_case(flat_relief, right_box);
   std::ranges::fill(c.changes.t2.changed_confidence, 0.5f);
-  EXPECT_TRUE(instances_of(c).instances.empty());
-  EXPECT_FALSE(instances_of(c, {.min_confidence = 0.4}).instances.empty());
+  const ChangeInstances found = instances_of(c);
+  EXPECT_TRUE(found.instances.empty());
+  EXPECT_EQ(found.unsure, 0);  // too unsure to speak of
+  EXPECT_EQ(instances_of(c, {.min_confidence = 0}).instances.size(), 1u);
 }
 
-TEST(FindInstances, WhatOnlyAFewPhotosOfItsEpochCallChangedIsLeftOut) {
+TEST(FindInstances, WhatIsNearlySureEnoughIsCounted) {
+  const Case c = make_case(flat_relief, right_box);
+  const ChangeInstances listed = instances_of(c);
+  ASSERT_EQ(listed.instances.size(), 1u);
+  EXPECT_EQ(listed.unsure, 0);
+  const ChangeInstances counted = instances_of(c, {.min_confidence = 1});
+  EXPECT_TRUE(counted.instances.empty());
+  EXPECT_EQ(counted.unsure, 1);
+  EXPECT_DOUBLE_EQ(counted.unsure_confidence, listed.instances[0].confidence());
+}
+
+TEST(FindInstances, WhatOnlyAFewPhotosOfItsEpochCallChangedIsLessLikely) {
   Case c = make_case(flat_relief, right_box);
-  ASSERT_EQ(instances_of(c).instances.size(), 1u);
+  const ChangeInstances all = instances_of(c);
+  ASSERT_EQ(all.instances.size(), 1u);
   // The last two of five photos take it all back.
   EpochChange& change = c.changes.t2;
-  std::vector<float> confidence;
+  std::vector<float> confidence, evidence;
   for (size_t i = 0, k = 0; i < change.label.size(); ++i) {
     if (!is_change(change.label[i])) continue;
-    const float own = change.changed_confidence[k++];
     if (i < 3 * c.after.pixels_per_frame()) {
-      confidence.push_back(own);
+      confidence.push_back(change.changed_confidence[k]);
+      evidence.push_back(change.changed_evidence[k]);
     } else {
       change.label[i] = ChangeLabel::kUnchanged;
     }
+    ++k;
   }
   change.changed_confidence = confidence;
-  EXPECT_EQ(instances_of(c, {.min_corroboration = 0.3}).instances.size(), 1u);
-  EXPECT_TRUE(instances_of(c, {.min_corroboration = 0.7}).instances.empty());
+  change.changed_evidence = evidence;
+  const ChangeInstances fewer = instances_of(c, {.min_confidence = 0});
+  ASSERT_EQ(fewer.instances.size(), 1u);
+  const ThingSigns& signs = fewer.instances[0].after->signs;
+  EXPECT_EQ(signs.photos, 3);
+  EXPECT_LT(signs.called_changed, 0.7);
+  EXPECT_LT(fewer.instances[0].confidence(), all.instances[0].confidence());
 }
 
 TEST(FindInstances, SpecksThatAreFarApartForTheirNumberAreLeftOut) {

@@ -36,8 +36,9 @@ struct EpochChange {
   std::vector<float> score;
   // [S, H, W] or empty. Where present it decides, and the score only says how far.
   std::vector<ChangeLabel> label;
-  // With labels: how sure each pixel called changed is, 0 to 1, in pixel order.
-  std::vector<float> changed_confidence;
+  // With labels, of each pixel called changed, in pixel order: how sure it is, 0 to 1, and the gap
+  // in sigmas, at most 8 (photo_answers.h).
+  std::vector<float> changed_confidence, changed_evidence;
   int64_t points = 0;      // pixels with evidence
   int64_t changed = 0;     // of them called changed
   int64_t unobserved = 0;  // of them not seen by the other epoch; known with labels only

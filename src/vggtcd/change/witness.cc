@@ -6,12 +6,35 @@
 #include <limits>
 
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/scene/pixel_counts.h"
+#include "vggtcd/scene/sky.h"
 
 namespace vggtcd {
+namespace {
 
-Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence) {
+// The sky testifies this far from everything else only, of the photo's width: where a roof ends the
+// poses of two photos need not agree to the pixel.
+constexpr int kOpenMarginSteps = 40;
+
+void mark_open_sky(const Reconstruction& epoch, size_t frame, std::span<uint8_t> extremes) {
+  const std::span<const uint8_t> sky =
+      std::span(epoch.sky).subspan(frame * epoch.pixels_per_frame(), epoch.pixels_per_frame());
+  std::vector<uint8_t> open(sky.size());
+  std::ranges::transform(sky, open.begin(), [](uint8_t s) { return s == kOpenSky ? 1 : 0; });
+  const PixelCounts counts(open, epoch.width, epoch.height);
+  const int margin = std::max(1, epoch.width / kOpenMarginSteps);
+  for (size_t i = 0; i < open.size(); ++i) {
+    if (open[i] != 0 && counts.all_around(i, margin)) extremes[i] = kOpenWindow;
+  }
+}
+
+}  // namespace
+
+Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence,
+                     double open_gap_u) {
   Witness witness{&epoch,
                   static_cast<float>(t2_from_epoch.scale),
+                  static_cast<float>(open_gap_u),
                   WindowSteps(epoch.width),
                   {},
                   std::vector<uint8_t>(epoch.num_pixels(), kNoExtremes),
@@ -40,6 +63,10 @@ Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, flo
             first + static_cast<size_t>(v) * static_cast<size_t>(width) + static_cast<size_t>(u);
         if (hi > 0) witness.extremes[i] = static_cast<uint8_t>(nearest | farthest << 4);
       }
+    }
+    if (!epoch.sky.empty()) {
+      mark_open_sky(epoch, static_cast<size_t>(frame),
+                    std::span(witness.extremes).subspan(first, epoch.pixels_per_frame()));
     }
   });
   return witness;

@@ -20,6 +20,8 @@ namespace vggtcd {
 struct Witness {
   const Reconstruction* epoch;
   float t2_scale;  // T2 units of a unit of the epoch
+  float
+      open_gap_u;  // how far beyond a point a photo sees at least where it looks into the open sky
   WindowSteps steps;
   std::vector<Rigid3> camera_from_t2;  // depths in T2 units
   std::vector<uint8_t> extremes;       // [S, H, W]: of the DepthWindows
@@ -37,7 +39,9 @@ inline bool testifies(const Reconstruction& r, size_t pixel, float min_confidenc
   return r.depth[pixel] > 0 && r.confidence[pixel] >= min_confidence;
 }
 
-Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence);
+// open_gap_u: T2 units.
+Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, float min_confidence,
+                     double open_gap_u);
 
 // The projection of a pair of photos as floats, for the inner loop.
 struct PairProjection {
@@ -91,13 +95,21 @@ inline constexpr float kOneSurface = 1.1f;
 
 // The rule, with t = tolerance_sigmas * sigma * z: near - z > t looks through, z - far > t hidden,
 // otherwise the surface is seen. A window of one surface is taken at half its width: the pixel
-// nearest to a point is half a pixel off at most, the window one and a half. x is in T2.
+// nearest to a point is half a pixel off at most, the window one and a half. Where the photo shows
+// the open sky it looks through any point, by open_gap_u. x is in T2.
 inline Testimony ask(const PairProjection& pair, const DepthWindows& photo,
-                     const Eigen::Vector3f& x, float tolerance_sigmas) {
+                     const Eigen::Vector3f& x, float tolerance_sigmas, float open_gap_u) {
   Testimony said;
   if (!pair(x, said.column, said.row, said.z)) return said;
   said.vote = Vote::kNoTestimony;
   said.sigma_u = pair.sigma * said.z;
+  if (photo.open(said.column, said.row)) {
+    if (!(said.sigma_u > 0)) return said;
+    said.gap_u = open_gap_u;
+    said.near = said.far = said.z + open_gap_u;
+    said.vote = Vote::kLooksThrough;
+    return said;
+  }
   if (!photo.read(said.column, said.row, said.near, said.far)) return said;
   if (said.far < kOneSurface * said.near) {
     const float quarter = 0.25f * (said.far - said.near);

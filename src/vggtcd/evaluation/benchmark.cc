@@ -20,9 +20,12 @@
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 #include "vggtcd/scene/keyframes.h"
+#include "vggtcd/scene/sky.h"
 
 namespace vggtcd {
 namespace {
+
+constexpr uint8_t kGrey = 128;
 
 std::vector<Rigid3> poses_of(const std::vector<View>& views) {
   std::vector<Rigid3> poses;
@@ -50,10 +53,10 @@ MethodOutcome outcome_of(const std::string& method, const MethodAnswer& answer,
   outcome.failure = answer.failure;
   if (!answer.failure.empty()) return outcome;
   outcome.seconds = answer.seconds;
-  outcome.t2_from_t1 = answer.t2_from_t1;
+  outcome.found = answer.found;
   try {
     const BitemporalTrajectory mapped = register_trajectory(
-        poses_of(problem.before.views), poses_of(problem.after.views), outcome.t2_from_t1);
+        poses_of(problem.before.views), poses_of(problem.after.views), outcome.found.t2_from_t1);
     outcome.errors = evaluate_trajectory(mapped, truth);
     outcome.centers_t1 = centers_of(mapped.t1, outcome.errors.truth_from_predicted);
     outcome.centers_t2 = centers_of(mapped.t2, outcome.errors.truth_from_predicted);
@@ -95,6 +98,8 @@ AblationOutcome run_budget(int keyframes, const RegistrationProblem& problem,
 
 std::vector<AblationOutcome> run_synthetic_ablation(const SyntheticScene& scene,
                                                     const SceneTruth& truth,
+                                                    const ErrorModel& errors,
+                                                    const BenchmarkOptions& options,
                                                     const RegistrationProblem& problem,
                                                     const BitemporalTrajectory& true_poses) {
   const int frames_t1 = truth.of(Epoch::kT1).num_frames();
@@ -107,8 +112,8 @@ std::vector<AblationOutcome> run_synthetic_ablation(const SyntheticScene& scene,
     joint.keyframes_t1 = select_keyframes(frames_t1, count);
     joint.keyframes_t2 = select_keyframes(frames_t2, count);
     joint.reconstruction =
-        simulate_joint(scene, truth, joint.keyframes_t1, joint.keyframes_t2, ErrorModel{})
-            .reconstruction;
+        simulate_joint(scene, truth, joint.keyframes_t1, joint.keyframes_t2, errors).reconstruction;
+    if (options.find_sky) remove_sky(joint.reconstruction);
     outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, true_poses));
   }
   return outcomes;
@@ -117,6 +122,7 @@ std::vector<AblationOutcome> run_synthetic_ablation(const SyntheticScene& scene,
 // With the joint passes that are there: that of the tables, and files for other numbers of
 // keyframes.
 std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files,
+                                              const BenchmarkOptions& options,
                                               const RegistrationProblem& problem,
                                               const BitemporalTrajectory& truth,
                                               ProgressSink& progress) {
@@ -124,7 +130,8 @@ std::vector<AblationOutcome> run_wat_ablation(const std::filesystem::path& files
   for (const int keyframes : kAblationKeyframes) {
     const std::filesystem::path file = files / wat_joint_name(keyframes);
     if (exists_at(file)) {
-      const JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
+      JointReconstruction joint = read_joint(file, problem.before, problem.after, progress);
+      if (options.find_sky) remove_sky(joint.reconstruction);
       outcomes.push_back(run_budget(keyframes, {problem.before, problem.after, joint}, truth));
     } else if (problem.joint.keyframes_t1.size() == static_cast<size_t>(keyframes)) {
       outcomes.push_back(run_budget(keyframes, problem, truth));
@@ -164,21 +171,31 @@ void BenchmarkOptions::validate() const {
   check_field(frames == 0 || frames >= 4, "frames", frames, "0 or at least 4");
   check_field(width >= 32 && width % 2 == 0, "width", width, "even, at least 32");
   check_field(keyframes >= 2, "keyframes", keyframes, "at least 2");
+  check_field(error_size >= 0, "error_size", error_size, "at least 0");
+  check_field(outlier_keyframes >= 0 && outlier_keyframes < keyframes, "outlier_keyframes",
+              outlier_keyframes, "at least 0, and fewer than keyframes");
 }
 
 SceneOutcome run_synthetic_scene(const std::string& name, uint64_t seed,
                                  const BenchmarkOptions& options, const std::filesystem::path& kept,
                                  ProgressSink& progress) {
   options.validate();
-  const SyntheticScene scene = make_scene(name, seed, options.change);
+  const SyntheticScene scene = make_scene(name, seed, options.change, options.texture);
   RenderOptions render_options;
   render_options.frames = options.frames;
   render_options.width = options.width;
   render_options.photo_scale = 1;  // colours only
   render_options.samples = 2;
   const SceneTruth truth = render(scene, render_options, progress);
-  const SimulatedPredictions predictions =
-      simulate_predictions(scene, truth, options.keyframes, ErrorModel{});
+  ErrorModel errors;
+  errors.error_size = options.error_size;
+  errors.outlier_keyframes = options.outlier_keyframes;
+  SimulatedPredictions predictions = simulate_predictions(scene, truth, options.keyframes, errors);
+  for (Reconstruction* pass : {&predictions.t1.reconstruction, &predictions.t2.reconstruction,
+                               &predictions.joint.reconstruction}) {
+    if (!options.photos) std::ranges::fill(pass->color, kGrey);
+    if (options.find_sky) remove_sky(*pass);
+  }
   const RegistrationProblem problem{predictions.t1.reconstruction, predictions.t2.reconstruction,
                                     predictions.joint};
   const BitemporalTrajectory true_poses{poses_of(truth.of(Epoch::kT1).views),
@@ -198,14 +215,15 @@ SceneOutcome run_synthetic_scene(const std::string& name, uint64_t seed,
   outcome.methods = run_methods(problem, true_poses, options.rivals, kept, progress);
   if (options.ablation) {
     ProgressStage stage(progress, "keyframe ablation");
-    outcome.ablation = run_synthetic_ablation(scene, truth, problem, true_poses);
+    outcome.ablation = run_synthetic_ablation(scene, truth, errors, options, problem, true_poses);
   }
   for (const char* alignment : {"paper", "robust"}) {
     const MethodOutcome* method = find_outcome(outcome, alignment);
     if (method == nullptr) continue;
     ProgressStage stage(progress, fmt::format("change, alignment {}", alignment));
-    ChangeBenchmark change = benchmark_changes({scene, truth, problem.before, problem.after},
-                                               method->t2_from_t1, alignment, progress);
+    ChangeBenchmark change =
+        benchmark_changes({scene, truth, problem.before, problem.after},
+                          method->found.surface_t2_from_t1, alignment, progress);
     std::move(change.changes.begin(), change.changes.end(), std::back_inserter(outcome.changes));
     std::move(change.instances.begin(), change.instances.end(),
               std::back_inserter(outcome.instances));
@@ -218,9 +236,12 @@ SceneOutcome run_wat_scene(const std::string& name, const std::filesystem::path&
                            const BenchmarkOptions& options, const std::filesystem::path& kept,
                            ProgressSink& progress) {
   const std::filesystem::path files = predictions / name;
-  const Reconstruction before = read_reconstruction(files / "t1.npz", progress);
-  const Reconstruction after = read_reconstruction(files / "t2.npz", progress);
-  const JointReconstruction joint = read_joint(files / "joint.npz", before, after, progress);
+  Reconstruction before = read_reconstruction(files / "t1.npz", progress);
+  Reconstruction after = read_reconstruction(files / "t2.npz", progress);
+  JointReconstruction joint = read_joint(files / "joint.npz", before, after, progress);
+  for (Reconstruction* pass : {&before, &after, &joint.reconstruction}) {
+    if (options.find_sky) remove_sky(*pass);
+  }
   const RegistrationProblem problem{before, after, joint};
   const BitemporalTrajectory truth = read_wat_truth(data / name, before, after);
   SceneOutcome outcome;
@@ -229,7 +250,8 @@ SceneOutcome run_wat_scene(const std::string& name, const std::filesystem::path&
   outcome.true_centers_t2 = centers_of(truth.t2);
   outcome.scale = 0;  // not known
   outcome.methods = run_methods(problem, truth, options.rivals, kept, progress);
-  if (options.ablation) outcome.ablation = run_wat_ablation(files, problem, truth, progress);
+  if (options.ablation)
+    outcome.ablation = run_wat_ablation(files, options, problem, truth, progress);
   return outcome;
 }
 

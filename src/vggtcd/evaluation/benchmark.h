@@ -10,6 +10,7 @@
 #include "vggtcd/core/options.h"
 #include "vggtcd/core/progress.h"
 #include "vggtcd/evaluation/change_benchmark.h"
+#include "vggtcd/evaluation/registration_methods.h"
 #include "vggtcd/evaluation/synthetic/scene.h"
 #include "vggtcd/evaluation/trajectory_metrics.h"
 #include "vggtcd/geometry/sim3.h"
@@ -23,6 +24,11 @@ struct BenchmarkOptions {
   int frames = 24;
   int width = 160;
   int keyframes = 5;
+  SceneTexture texture = SceneTexture::kScene;
+  bool photos = true;
+  double error_size = 1;
+  int outlier_keyframes = 0;
+  bool find_sky = true;
   bool rivals = true;
   bool ablation = true;
 
@@ -36,6 +42,16 @@ struct BenchmarkOptions {
     field("frames", self.frames, "synthetic: frames per epoch; 0: each scene's own number");
     field("width", self.width, "synthetic: width of the depth maps in px");
     field("keyframes", self.keyframes, "keyframes per epoch in the joint pass");
+    field(
+        "texture", self.texture,
+        "synthetic: scene: each surface its own; one: all surfaces the same; none: plain surfaces");
+    field("photos", self.photos,
+          "synthetic: the predictions hold photos; without them all is grey");
+    field("error_size", self.error_size,
+          "synthetic: the errors of the predictions are this many times as large");
+    field("outlier_keyframes", self.outlier_keyframes,
+          "synthetic: photos of the joint pass that go wrong for certain");
+    field("find_sky", self.find_sky, "leave the sky out, as detect does (all methods)");
     field("rivals", self.rivals, "also run FGR, RANSAC+ICP and Scale+ICP");
     field("ablation", self.ablation, "also vary the number of keyframes");
   };
@@ -53,7 +69,7 @@ struct MethodOutcome {
   std::string failure;  // why there are no numbers; empty: there are
   TrajectoryErrors errors;
   double seconds = 0;
-  Sim3 t2_from_t1;
+  RegistrationAnswer found;
   // Camera centres in the truth's frame after the one alignment of the protocol, for plots.
   std::vector<Eigen::Vector3d> centers_t1, centers_t2;
 };

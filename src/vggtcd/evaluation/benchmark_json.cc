@@ -56,7 +56,10 @@ void members(T& v, const Visit& io) {
   io("method", v.method);
   io("failure", v.failure);
   io("seconds", v.seconds);
-  io("t2_from_t1", v.t2_from_t1);
+  io("t2_from_t1", v.found.t2_from_t1);
+  io("surface_t2_from_t1", v.found.surface_t2_from_t1);
+  io("verdict", v.found.verdict);
+  io("plausibility", v.found.plausibility);
   io("errors", v.errors);
   io("centers_t1", v.centers_t1);
   io("centers_t2", v.centers_t2);
@@ -79,6 +82,7 @@ void members(T& v, const Visit& io) {
   io("scores", v.scores);
   io("evidence", v.evidence);
   io("unseen_called_changed", v.unseen_called_changed);
+  io("sky_called_changed", v.sky_called_changed);
 }
 
 template <Like<InstanceOutcome> T, typename Visit>

@@ -14,6 +14,7 @@
 #include "vggtcd/evaluation/change_tables.h"
 #include "vggtcd/evaluation/paper_numbers.h"
 #include "vggtcd/evaluation/registration_methods.h"
+#include "vggtcd/evaluation/verdict_table.h"
 #include "vggtcd/io/output_directory.h"
 #include "vggtcd/io/output_file.h"
 
@@ -245,6 +246,7 @@ std::string report_markdown(const SuiteReport& report) {
   out +=
       table(report, "Registration, seconds", 2, [](const MethodOutcome& m) { return m.seconds; });
   out += failures(report);
+  out += verdict_section(report.scenes);
   out += ablation_section(report);
   out += change_section(report.scenes);
   out += instance_section(report.scenes);

@@ -106,6 +106,8 @@ std::vector<ChangeSummary> summarise_changes(const std::vector<SceneOutcome>& sc
       s.false_alarms += c.scores.false_alarms;
       s.unseen_called_changed += c.unseen_called_changed;
       s.evidence += c.evidence;
+      s.outdoor_scenes += scene.outdoor ? 1 : 0;
+      s.sky_called_changed += c.sky_called_changed;
       if (c.scores.changed_pixels == 0) continue;
       ++s.changed_scenes;
       s.precision += c.scores.precision;
@@ -117,6 +119,7 @@ std::vector<ChangeSummary> summarise_changes(const std::vector<SceneOutcome>& sc
   }
   for (ChangeSummary& s : summaries) {
     for (double* mean : {&s.false_alarms, &s.unseen_called_changed, &s.evidence}) *mean /= s.scenes;
+    s.sky_called_changed /= std::max(1, s.outdoor_scenes);
     for (double* mean : {&s.precision, &s.recall, &s.f1, &s.auprc, &s.best_f1}) {
       *mean /= std::max(1, s.changed_scenes);
     }

@@ -44,6 +44,8 @@ struct ChangeSummary {
   double precision = 0, recall = 0, f1 = 0, auprc = 0, best_f1 = 0;
   double false_alarms = 0, unseen_called_changed = 0;
   double evidence = 0;  // share of the pixels that carry evidence
+  int outdoor_scenes = 0;
+  double sky_called_changed = 0;  // share of the sky, mean over the outdoor scenes
 };
 std::vector<ChangeSummary> summarise_changes(const std::vector<SceneOutcome>& scenes);
 

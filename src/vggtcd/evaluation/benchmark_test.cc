@@ -102,6 +102,7 @@ TEST_F(Slice, ChangesAreFoundWithinFixedLimits) {
     // The known weakness of a plain distance, and what votes are for.
     EXPECT_GT(distance.unseen_called_changed, 0.5) << scene.scene;
     EXPECT_LT(votes.unseen_called_changed, 0.01) << scene.scene;
+    EXPECT_LT(votes.sky_called_changed, 0.001) << scene.scene;
     ASSERT_EQ(scene.instances.size(), 4u);
     for (const InstanceOutcome& outcome : scene.instances) {
       EXPECT_GE(outcome.scores.objects, 5) << scene.scene;

@@ -89,14 +89,21 @@ ChangeOutcome score_changes(const std::vector<AnsweredEpoch>& epochs, bool unsee
   outcome.unseen_counted = unseen_counted;
   outcome.every_pixel = every_pixel;
   ScoredPixels pixels;
-  int64_t unseen = 0, unseen_called = 0, labelled = 0, with_evidence = 0;
+  int64_t unseen = 0, unseen_called = 0, labelled = 0, with_evidence = 0, sky = 0, sky_called = 0;
   for (const auto& [truth, answer] : epochs) {
     check(answer.score.size() == truth.label.size() && answer.called.size() == truth.label.size(),
           "score_changes: an answer for every pixel");
     for (size_t pixel = 0; pixel < truth.label.size(); ++pixel) {
       const uint8_t label = truth.label[pixel];
-      if (label == kLabelVoid) continue;
       const bool evidence = !std::isnan(answer.score[pixel]);
+      if (truth.object[pixel] == 0) {  // sky: nothing changes there, and saying nothing is right
+        const bool called = evidence && answer.called[pixel] != 0;
+        if (evidence) pixels.add(answer.score[pixel], called, false);
+        ++sky;
+        sky_called += called ? 1 : 0;
+        continue;
+      }
+      if (label == kLabelVoid) continue;
       ++labelled;
       with_evidence += evidence ? 1 : 0;
       if (!evidence && !every_pixel) continue;
@@ -113,6 +120,7 @@ ChangeOutcome score_changes(const std::vector<AnsweredEpoch>& epochs, bool unsee
   }
   outcome.scores = evaluate_changes(pixels);
   outcome.unseen_called_changed = share(unseen_called, unseen);
+  outcome.sky_called_changed = share(sky_called, sky);
   outcome.evidence = share(with_evidence, labelled);
   return outcome;
 }

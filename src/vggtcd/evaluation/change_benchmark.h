@@ -15,7 +15,8 @@
 namespace vggtcd {
 
 // `unseen_counted`: pixels that the other epoch never saw are evaluated too. `every_pixel`: pixels
-// without evidence (low confidence) count as called unchanged; else they are left out.
+// without evidence (low confidence) count as called unchanged; else they are left out. A pixel of
+// the sky is unchanged where a method says anything about it, and left out where it says nothing.
 struct ChangeOutcome {
   std::string method;     // "distance": the paper's; "votes": free space
   std::string alignment;  // registration_methods() name
@@ -24,6 +25,7 @@ struct ChangeOutcome {
   double evidence = 0;  // share of the labelled pixels that carry evidence
   // Share of unchanged, never-seen pixels that are called changed.
   double unseen_called_changed = 0;
+  double sky_called_changed = 0;  // share of the sky's pixels, with evidence or without
 };
 
 struct InstanceOutcome {

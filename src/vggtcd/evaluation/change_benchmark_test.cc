@@ -24,8 +24,9 @@ class ScoreChanges : public testing::Test {
     add(kLabelUnchanged, false, kNone, false);
     add(kLabelVoid, true, 1.0f, true);
   }
-  void add(uint8_t label, bool looked, float score, bool called) {
+  void add(uint8_t label, bool looked, float score, bool called, uint16_t object = 1) {
     truth_.label.push_back(label);
+    truth_.object.push_back(object);
     truth_.other_looked.push_back(looked ? 1 : 0);
     answer_.score.push_back(score);
     answer_.called.push_back(called ? 1 : 0);
@@ -45,6 +46,22 @@ TEST_F(ScoreChanges, OnlySurfaceThatBothSawWithEvidence) {
   EXPECT_DOUBLE_EQ(outcome.scores.recall, 1.0 / 2);
   EXPECT_DOUBLE_EQ(outcome.scores.false_alarms, 1);
   EXPECT_DOUBLE_EQ(outcome.unseen_called_changed, 1);  // the other one has no evidence
+}
+
+TEST_F(ScoreChanges, TheSkyIsUnchangedWhereAnythingIsSaid) {
+  const ChangeOutcome without = score(false, true);
+  add(kLabelVoid, false, kNone, false, 0);  // nothing said: right, and not counted
+  EXPECT_EQ(score(false, true).scores.pixels, without.scores.pixels);
+  add(kLabelVoid, false, 0.95f, true, 0);
+  add(kLabelVoid, false, 0.1f, false, 0);
+  for (const bool every_pixel : {false, true}) {
+    const ChangeOutcome outcome = score(false, every_pixel);
+    EXPECT_EQ(outcome.scores.pixels, every_pixel ? 6 : 5);
+    EXPECT_DOUBLE_EQ(outcome.scores.precision, 1.0 / 3);
+    EXPECT_DOUBLE_EQ(outcome.scores.false_alarms, 2.0 / 3);
+    EXPECT_DOUBLE_EQ(outcome.sky_called_changed, 1.0 / 3);
+    EXPECT_DOUBLE_EQ(outcome.evidence, without.evidence);  // of surface
+  }
 }
 
 TEST_F(ScoreChanges, NeverSeenSurfaceIsCountedAsWhatItIs) {

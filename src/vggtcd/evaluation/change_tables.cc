@@ -18,7 +18,8 @@ std::string row_name(const std::string& method, const std::string& alignment) {
 std::string means(const std::vector<ChangeSummary>& summaries, bool unseen, bool every_pixel) {
   std::string out = fmt::format(
       "\n### {}, {}\n\n| Method | evidence % | precision | recall | F1 | AUPRC | best F1 | false "
-      "alarms % | never-seen called changed % |\n|---|---|---|---|---|---|---|---|---|\n",
+      "alarms % | never-seen called changed % | sky called changed % |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n",
       unseen ? "Never-seen surface counted" : "Only surface that both epochs saw",
       every_pixel ? "every pixel (without evidence: called unchanged)" : "pixels with evidence");
   for (const ChangeSummary& s : summaries) {
@@ -30,7 +31,8 @@ std::string means(const std::vector<ChangeSummary>& summaries, bool unseen, bool
     } else {
       out += " | | | | |";  // nothing changed: only false alarms can be counted
     }
-    out += fmt::format(" {:.2f} | {:.2f} |\n", 100 * s.false_alarms, 100 * s.unseen_called_changed);
+    out += fmt::format(" {:.2f} | {:.2f} | {:.1f} |\n", 100 * s.false_alarms,
+                       100 * s.unseen_called_changed, 100 * s.sky_called_changed);
   }
   return out;
 }
@@ -108,15 +110,15 @@ std::string instance_section(const std::vector<SceneOutcome>& scenes) {
 std::string change_csv(const std::vector<SceneOutcome>& scenes) {
   std::string out =
       "scene,seed,method,alignment,unseen_counted,every_pixel,pixels,changed_pixels,precision,"
-      "recall,f1,auprc,best_f1,false_alarms,unseen_called_changed,evidence\n";
+      "recall,f1,auprc,best_f1,false_alarms,unseen_called_changed,sky_called_changed,evidence\n";
   for (const SceneOutcome& scene : scenes) {
     for (const ChangeOutcome& c : scene.changes) {
       const ChangeScores& s = c.scores;
-      out +=
-          fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", scene.scene, scene.seed,
-                      c.method, c.alignment, c.unseen_counted ? 1 : 0, c.every_pixel ? 1 : 0,
-                      s.pixels, s.changed_pixels, s.precision, s.recall, s.f1, s.auprc, s.best_f1,
-                      s.false_alarms, c.unseen_called_changed, c.evidence);
+      out += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", scene.scene,
+                         scene.seed, c.method, c.alignment, c.unseen_counted ? 1 : 0,
+                         c.every_pixel ? 1 : 0, s.pixels, s.changed_pixels, s.precision, s.recall,
+                         s.f1, s.auprc, s.best_f1, s.false_alarms, c.unseen_called_changed,
+                         c.sky_called_changed, c.evidence);
     }
   }
   return out;

@@ -34,10 +34,11 @@ Overlaps count_overlaps(const InstancePixels& epoch) {
         "evaluate_instances: arrays of one size");
   Overlaps result;
   for (size_t pixel = 0; pixel < size; ++pixel) {
-    if (epoch.label[pixel] == kLabelVoid) continue;
+    const uint16_t object = epoch.object[pixel];
+    const bool sky = object == 0;  // void, but whoever reports it as a thing is wrong
+    if (epoch.label[pixel] == kLabelVoid && !sky) continue;
     const bool changed = epoch.label[pixel] == kLabelChanged;
     const bool seen = changed && epoch.other_looked[pixel] != 0;
-    const uint16_t object = epoch.object[pixel];
     if (seen) ++result.visible[object];
     if (epoch.reported[pixel] == 0) continue;
     Reported& reported = result.reported[epoch.reported[pixel]];

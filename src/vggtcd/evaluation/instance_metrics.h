@@ -25,7 +25,8 @@ struct InstancePixels {
 // of that instance's pixels lie on changed surface of whatever object. It is told apart if,
 // besides, kMinRight of the instance's pixels on changed surface lie on this object. A reported
 // instance (its part in one epoch) is right if kMinRight of its pixels lie on changed surface. Void
-// pixels are left out everywhere; what the other epoch never saw counts as what it is.
+// pixels are left out everywhere, but for the sky, which is unchanged; what the other epoch never
+// saw counts as what it is.
 //
 // Why not IoU above one half: a method that drops the less confident half of the pixels, as the
 // paper's does, covers half of an object when it finds all that it looks at, and things that touch

@@ -12,7 +12,8 @@ namespace vggtcd {
 namespace {
 
 // One character per pixel. truth: '.' unchanged surface, a letter: changed object (A = 1, ...), the
-// small letter: the same, but never seen by the other epoch, '#' void. reported: '.' none, digits.
+// small letter: the same, but never seen by the other epoch, '#' void, '~' sky. reported: '.' none,
+// digits.
 struct Row {
   std::vector<int32_t> reported;
   std::vector<uint16_t> object;
@@ -22,8 +23,12 @@ struct Row {
     EXPECT_EQ(truth.size(), answer.size());
     for (const char c : truth) {
       const bool upper = c >= 'A' && c <= 'Z', lower = c >= 'a' && c <= 'z';
-      object.push_back(static_cast<uint16_t>(upper ? c - 'A' + 1 : lower ? c - 'a' + 1 : 26));
-      label.push_back(upper || lower ? kLabelChanged : c == '#' ? kLabelVoid : kLabelUnchanged);
+      const bool none = c == '#' || c == '~';
+      object.push_back(static_cast<uint16_t>(upper      ? c - 'A' + 1
+                                             : lower    ? c - 'a' + 1
+                                             : c == '~' ? 0
+                                                        : 26));
+      label.push_back(upper || lower ? kLabelChanged : none ? kLabelVoid : kLabelUnchanged);
       other_looked.push_back(lower ? 0 : 1);
     }
     for (const char c : answer) reported.push_back(c == '.' ? 0 : c - '0');
@@ -59,6 +64,14 @@ TEST(EvaluateInstances, AnInstanceMostlyOnUnchangedSurfaceFindsNothing) {
   EXPECT_EQ(less.right, 0);
   EXPECT_EQ(less.reported, 1);
   EXPECT_DOUBLE_EQ(less.precision(), 0);
+}
+
+TEST(EvaluateInstances, AThingInTheSkyIsWrong) {
+  const InstanceScores alone = evaluate("AAAA~~~~", "1111222.");
+  EXPECT_EQ(alone.reported, 2);
+  EXPECT_EQ(alone.right, 1);
+  EXPECT_EQ(evaluate("AAAA~~~~~", "111111111").right, 0);   // more sky than object
+  EXPECT_EQ(evaluate("AAAA####", "11112222").reported, 1);  // what is only void is not counted
 }
 
 TEST(EvaluateInstances, OneInstanceOverTwoObjectsFindsBothAndTellsTheLargerApart) {

@@ -49,7 +49,7 @@ MethodAnswer run(const RegistrationMethod& method, const RegistrationProblem& pr
   MethodAnswer answer;
   const auto start = std::chrono::steady_clock::now();
   try {
-    answer.t2_from_t1 = method.run(problem);
+    answer.found = method.run(problem);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::kDegenerate) throw;
     answer.failure = error.what();
@@ -88,7 +88,7 @@ MethodAnswer run_or_recall(const RegistrationMethod& method, const RegistrationP
   write_json_file(kept / file.filename().string(),
                   Json{{"failure", answer.failure},
                        {"seconds", answer.seconds},
-                       {"t2_from_t1", sim3_to_json(answer.t2_from_t1)}});
+                       {"t2_from_t1", sim3_to_json(answer.found.t2_from_t1)}});
   kept.commit();
   return answer;
 }

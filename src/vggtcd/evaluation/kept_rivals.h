@@ -11,7 +11,7 @@ namespace vggtcd {
 
 struct MethodAnswer {
   std::string failure;  // why there is none; empty: there is
-  Sim3 t2_from_t1;
+  RegistrationAnswer found;
   double seconds = 0;  // when it was computed
 };
 

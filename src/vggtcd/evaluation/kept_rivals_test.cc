@@ -43,20 +43,20 @@ class KeptRivals : public testing::Test {
 };
 
 TEST_F(KeptRivals, AnswersAboutTheSamePointsAreGivenOnce) {
-  EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 1);
-  EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 1);
+  EXPECT_EQ(ask({near_, far_, joint_}).found.t2_from_t1.scale, 1);
+  EXPECT_EQ(ask({near_, far_, joint_}).found.t2_from_t1.scale, 1);
   EXPECT_EQ(calls_, 1);
 }
 
 TEST_F(KeptRivals, OtherPointsAreAnotherQuestion) {
   ask({near_, far_, joint_});
-  EXPECT_EQ(ask({far_, near_, joint_}).t2_from_t1.scale, 2);
+  EXPECT_EQ(ask({far_, near_, joint_}).found.t2_from_t1.scale, 2);
   Reconstruction moved = near_;
   moved.views[0].camera_from_world.translation.x() = 1e-9;
-  EXPECT_EQ(ask({moved, far_, joint_}).t2_from_t1.scale, 3);
+  EXPECT_EQ(ask({moved, far_, joint_}).found.t2_from_t1.scale, 3);
   Reconstruction recoloured = near_;
   recoloured.color[2] = 4;
-  EXPECT_EQ(ask({recoloured, far_, joint_}).t2_from_t1.scale, 4);
+  EXPECT_EQ(ask({recoloured, far_, joint_}).found.t2_from_t1.scale, 4);
   EXPECT_EQ(directory_.num_files(), 4u + 1u);  // and their list
 }
 
@@ -73,8 +73,8 @@ TEST_F(KeptRivals, AMutilatedAnswerIsComputedAgain) {
   for (const auto& file : std::filesystem::directory_iterator(directory_.path())) {
     if (file.path().extension() == ".json") write_bytes(file.path(), "{\"failure\": \"\"");
   }
-  EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 2);
-  EXPECT_EQ(ask({near_, far_, joint_}).t2_from_t1.scale, 2);
+  EXPECT_EQ(ask({near_, far_, joint_}).found.t2_from_t1.scale, 2);
+  EXPECT_EQ(ask({near_, far_, joint_}).found.t2_from_t1.scale, 2);
 }
 
 TEST_F(KeptRivals, AFileOfSomebodyElseIsNotReplaced) {
@@ -94,7 +94,7 @@ TEST_F(KeptRivals, AFileOfSomebodyElseIsNotReplaced) {
 TEST_F(KeptRivals, WithoutADirectoryNothingIsKept) {
   const RegistrationProblem problem{near_, far_, joint_};
   run_or_recall(counting(), problem, 0, {});
-  EXPECT_EQ(run_or_recall(counting(), problem, 0, {}).t2_from_t1.scale, 2);
+  EXPECT_EQ(run_or_recall(counting(), problem, 0, {}).found.t2_from_t1.scale, 2);
 }
 
 }  // namespace

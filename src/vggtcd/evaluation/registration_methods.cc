@@ -6,6 +6,7 @@
 #include "vggtcd/registration/candidates.h"
 #include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
+#include "vggtcd/registration/plausibility.h"
 
 namespace vggtcd {
 namespace {
@@ -14,16 +15,34 @@ Sim3 align_coarse_only(const RegistrationProblem& problem) {
   return align_coarse(problem.before, problem.after, problem.joint, {}).t2_from_t1;
 }
 
-Sim3 align_as_paper(const RegistrationProblem& problem) {
-  return align_fine(problem.before, problem.after, align_coarse_only(problem), {}).t2_from_t1;
+// The same verdict as `detect` gives.
+RegistrationAnswer judged(RegistrationAnswer answer, const RegistrationProblem& problem,
+                          const CoarseResult& coarse, const std::vector<std::string>& doubts = {}) {
+  const SurfaceAgreement surfaces =
+      surface_agreement(problem.before, problem.after, answer.surface_t2_from_t1);
+  answer.plausibility = enum_to_string(judge_plausibility(surfaces, coarse, doubts).verdict);
+  return answer;
 }
 
-Sim3 align_robustly(const RegistrationProblem& problem) {
+RegistrationAnswer align_as_paper(const RegistrationProblem& problem) {
+  const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
+  const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
+  RegistrationAnswer answer = fine.t2_from_t1;
+  answer.verdict = enum_to_string(fine.verdict);
+  return judged(answer, problem, coarse);
+}
+
+RegistrationAnswer align_robustly(const RegistrationProblem& problem) {
   const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
   const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
   const RobustStart start =
       start_from_joint(problem.before, problem.after, problem.joint, coarse, {}, {});
-  return choose_alignment(problem.before, problem.after, start, fine, {}).t2_from_t1;
+  const AlignmentChoice choice = choose_alignment(problem.before, problem.after, start, fine, {});
+  RegistrationAnswer answer;
+  answer.t2_from_t1 = choice.t2_from_t1;
+  answer.surface_t2_from_t1 = choice.surface_t2_from_t1;
+  answer.verdict = choice.verdict;
+  return judged(answer, problem, coarse, choice.robust.doubts());
 }
 
 RegistrationMethod rival(const std::string& name, std::string title) {
@@ -41,7 +60,7 @@ RegistrationMethod rival(const std::string& name, std::string title) {
 std::vector<RegistrationMethod> registration_methods() {
   std::vector<RegistrationMethod> methods;
   methods.push_back({"vggt_only", "VGGT only (identity)", false,
-                     [](const RegistrationProblem&) { return Sim3{}; }, ""});
+                     [](const RegistrationProblem&) { return RegistrationAnswer(); }, ""});
   methods.push_back(rival("fgr", "FGR"));
   methods.push_back(rival("ransac_icp", "RANSAC+ICP"));
   methods.push_back(rival("scale_icp", "Scale+ICP"));

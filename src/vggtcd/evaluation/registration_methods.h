@@ -17,13 +17,25 @@ struct RegistrationProblem {
   const JointReconstruction& joint;
 };
 
+// What a method says. Both similarities are T2 from T1; they differ for the robust method alone
+// (registration/robust.h).
+struct RegistrationAnswer {
+  Sim3 t2_from_t1, surface_t2_from_t1;
+  // What `detect` would say, machine-readable: the method about itself, and whether the alignment
+  // can be believed (registration/plausibility.h). Empty for methods that `detect` has not.
+  std::string verdict{}, plausibility{};
+
+  RegistrationAnswer() = default;
+  RegistrationAnswer(const Sim3& of_both) : t2_from_t1(of_both), surface_t2_from_t1(of_both) {}
+};
+
 struct RegistrationMethod {
   std::string name;   // in JSON and CSV: "ransac_icp"
   std::string title;  // in tables: "RANSAC+ICP"
   bool rival = false;
   // T2 from T1. Throws Error{kDegenerate} if the method finds no answer. Absent: not available in
   // this build; the row says so.
-  std::function<Sim3(const RegistrationProblem&)> run;
+  std::function<RegistrationAnswer(const RegistrationProblem&)> run;
   std::string absent_because;
 };
 

@@ -181,7 +181,7 @@ std::string most_changed(const ResultFrames& frames, const std::vector<int64_t>&
 
 struct Counts {
   ScoredPixels evidence, every_pixel;
-  int64_t seen = 0, unseen = 0, unseen_called = 0;
+  int64_t seen = 0, seen_with_evidence = 0, unseen = 0, unseen_called = 0;
   std::vector<int64_t> found_in_frame;  // of the epoch that was counted last
 };
 
@@ -191,10 +191,18 @@ void count(const NpzReader& truth, const std::string& suffix, const Answers& ans
   expect_maps(truth, "unseen_by_other" + suffix, maps);
   const auto label = truth.read<uint8_t>("changed" + suffix);
   const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
+  expect_maps(truth, "instance" + suffix, maps);
+  const auto object = truth.read<int64_t>("instance" + suffix);
   for (size_t pixel = 0; pixel < label.size(); ++pixel) {
-    if (label[pixel] == kLabelVoid) continue;
     const float rank = answers.rank[pixel];
     const bool evidence = !std::isnan(rank), called = answers.called[pixel] != 0;
+    if (object[pixel] == 0) {  // sky
+      if (!evidence) continue;
+      counts.every_pixel.add(rank, called, false);
+      counts.evidence.add(rank, called, false);
+      continue;
+    }
+    if (label[pixel] == kLabelVoid) continue;
     if (unseen[pixel]) {
       if (label[pixel] != kLabelUnchanged || !evidence) continue;
       ++counts.unseen;
@@ -202,6 +210,7 @@ void count(const NpzReader& truth, const std::string& suffix, const Answers& ans
       continue;
     }
     ++counts.seen;
+    counts.seen_with_evidence += evidence ? 1 : 0;
     const bool changed = label[pixel] == kLabelChanged;
     counts.every_pixel.add(evidence ? rank : kNotObserved, called, changed);
     if (evidence) counts.evidence.add(rank, called, changed);
@@ -245,7 +254,7 @@ ResultsScores score_results(const std::filesystem::path& results,
   scores.true_frames_t1 = static_cast<int>(true_cameras.t1.size());
   scores.true_frames_t2 = static_cast<int>(true_cameras.t2.size());
   scores.cameras = evaluate_trajectory(found, expected);
-  scores.evidence_share = static_cast<double>(counts.evidence.scores.size()) /
+  scores.evidence_share = static_cast<double>(counts.seen_with_evidence) /
                           static_cast<double>(std::max<int64_t>(1, counts.seen));
   scores.unseen_called_changed = static_cast<double>(counts.unseen_called) /
                                  static_cast<double>(std::max<int64_t>(1, counts.unseen));

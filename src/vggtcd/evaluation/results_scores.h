@@ -14,7 +14,8 @@ namespace vggtcd {
 // Error{kInput}.
 BitemporalTrajectory read_true_cameras(const std::filesystem::path& truth_npz);
 
-// Counted over the pixels of the truth, void ones left out. A pixel without evidence in the
+// Counted over the pixels of the truth, void ones left out, but for the sky: where the results say
+// anything about it, it counts as unchanged. A pixel without evidence in the
 // results, because of its confidence or because its photo is not among them, is not called changed.
 // The decision is that of the results. The ranking for average precision goes by the distance, or
 // where photos voted by the gap in sigmas (evidence_* of change.npz): then every pixel that has a

@@ -40,6 +40,9 @@ class Results : public ::testing::Test {
     truth.add<double>("extrinsic_t2", {2, 3, 4}, all.subspan(36));
     truth.add<uint8_t>("changed_t1", {3, 1, 2}, label_t1);
     truth.add<uint8_t>("changed_t2", {2, 1, 2}, label_t2);
+    const std::vector<int32_t> object(6, 1);
+    truth.add<int32_t>("instance_t1", {3, 1, 2}, object);
+    truth.add<int32_t>("instance_t2", {2, 1, 2}, std::span(object).first(4));
     truth.add_mask("unseen_by_other_t1", {3, 1, 2}, unseen_t1);
     truth.add_mask("unseen_by_other_t2", {2, 1, 2}, unseen_t2);
     truth.finish();

@@ -14,9 +14,17 @@ std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod) {
   return kNames;
 }
 
-AlignmentMethod resolve_method(AlignmentMethod method, bool own_joint_pass) {
+AlignmentMethod resolve_method(AlignmentMethod method, InitialSource source) {
   if (method != AlignmentMethod::kAuto) return method;
-  return own_joint_pass ? AlignmentMethod::kRobust : AlignmentMethod::kPaper;
+  switch (source) {
+    case InitialSource::kOwnJointPass:
+      return AlignmentMethod::kRobust;
+    case InitialSource::kOneModel:
+      return AlignmentMethod::kCoarse;
+    case InitialSource::kGiven:
+      break;
+  }
+  return AlignmentMethod::kPaper;
 }
 
 void AlignmentOptions::validate() const {
@@ -27,7 +35,7 @@ void AlignmentOptions::validate() const {
 
 Alignment align(const Reconstruction& before, const Reconstruction& after,
                 const InitialAlignment& initial, const AlignmentOptions& options, StageLog& log) {
-  const AlignmentMethod method = resolve_method(options.method, initial.own_joint_pass);
+  const AlignmentMethod method = resolve_method(options.method, initial.kind());
   Alignment result;
   result.initial_source = initial.source;
   if (initial.joint) {
@@ -51,6 +59,7 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
     result.explanation = fmt::format("The alignment was given ({}).", initial.source);
   }
   result.t2_from_t1 = result.initial_t2_from_t1;
+  result.surface_uncertainty = result.uncertainty;
 
   if (method != AlignmentMethod::kCoarse) {
     log.run("fine alignment", [&](ProgressStage&) {
@@ -63,6 +72,7 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
     result.verdict = enum_to_string(result.fine->verdict);
     result.explanation = result.fine->explanation;
   }
+  result.surface_t2_from_t1 = result.t2_from_t1;
   if (method == AlignmentMethod::kRobust) {
     log.run("robust alignment", [&](ProgressStage&) {
       RobustStart start{{result.chosen, result.initial_t2_from_t1, 0}, {}};
@@ -72,22 +82,26 @@ Alignment align(const Reconstruction& before, const Reconstruction& after,
       }
       AlignmentChoice choice = choose_alignment(before, after, start, *result.fine, options.robust);
       result.t2_from_t1 = choice.t2_from_t1;
+      result.surface_t2_from_t1 = choice.surface_t2_from_t1;
       result.chosen = std::move(choice.chosen);
       result.verdict = std::move(choice.verdict);
       result.explanation = std::move(choice.explanation);
       result.robust = std::move(choice.robust);
       if (result.chosen == "robust") {
         result.uncertainty = {result.robust->covariance, result.robust->pivot_in_t2};
+        result.surface_uncertainty = {result.robust->surface_covariance,
+                                      result.robust->pivot_in_t2};
       } else if (result.chosen == start.initial.name && start.uncertainty &&
                  start.uncertainty->similarity.covariance.trace() > 0) {
-        result.uncertainty = start.uncertainty->similarity;
+        result.uncertainty = result.surface_uncertainty = start.uncertainty->similarity;
       }
       result.candidates = std::move(choice.candidates);
     });
   }
   log.run("plausibility", [&](ProgressStage&) {
-    result.plausibility =
-        judge_plausibility(surface_agreement(before, after, result.t2_from_t1), result.coarse);
+    result.plausibility = judge_plausibility(
+        surface_agreement(before, after, result.surface_t2_from_t1), result.coarse,
+        result.robust ? result.robust->doubts() : std::vector<std::string>());
   });
   const PlausibilityResult& plausibility = result.plausibility;
   if (plausibility.refused() && !options.accept_alignment) {
@@ -105,6 +119,7 @@ Alignment in_worlds(Alignment alignment, const FrameOrigins& origins) {
     t2_from_t1 = between_worlds(t2_from_t1, origins.t1, origins.t2);
   };
   express(alignment.t2_from_t1);
+  express(alignment.surface_t2_from_t1);
   express(alignment.initial_t2_from_t1);
   if (alignment.coarse) {
     express(alignment.coarse->t2_from_t1);
@@ -116,10 +131,13 @@ Alignment in_worlds(Alignment alignment, const FrameOrigins& origins) {
   if (alignment.fine) express(alignment.fine->t2_from_t1);
   if (alignment.robust) {
     express(alignment.robust->t2_from_t1);
+    express(alignment.robust->surface_t2_from_t1);
     alignment.robust->pivot_in_t2 += origins.t2;
   }
   for (AlignmentCandidate& candidate : alignment.candidates) express(candidate.t2_from_t1);
-  if (alignment.uncertainty) alignment.uncertainty->pivot += origins.t2;
+  for (auto* uncertainty : {&alignment.uncertainty, &alignment.surface_uncertainty}) {
+    if (*uncertainty) (*uncertainty)->pivot += origins.t2;
+  }
   return alignment;
 }
 

@@ -20,18 +20,28 @@
 namespace vggtcd {
 
 enum class AlignmentMethod {
-  kAuto,    // robust after a joint pass that is an estimate of its own; else paper
+  kAuto,    // what resolve_method says
   kCoarse,  // the initial similarity as it is
   kPaper,   // and Algorithm 1 on top of it
   kRobust   // the best of initial, Algorithm 1 and the robust Sim(3) refinement
 };
 std::span<const EnumName<AlignmentMethod>> enum_names(AlignmentMethod);
 
-// What kAuto stands for; own_joint_pass as in InitialAlignment. Any other method is itself.
-AlignmentMethod resolve_method(AlignmentMethod method, bool own_joint_pass);
+// Where the similarity before refinement comes from.
+enum class InitialSource {
+  kOwnJointPass,  // a joint pass that is an estimate of its own
+  kOneModel,      // both epochs are parts of one model, which the joint reconstruction shows
+  kGiven          // by the user
+};
+
+// What kAuto stands for: robust, coarse, paper. In one model, whose photos were placed together,
+// there is nothing to refine: surfaces that each epoch measures with errors of its own know less
+// about it than the photos did. Any other method is itself.
+AlignmentMethod resolve_method(AlignmentMethod method, InitialSource source);
 
 struct AlignmentOptions {
   AlignmentMethod method = AlignmentMethod::kAuto;
+  bool find_sky = true;
   bool shared_intrinsics = false;
   CoarseOptions coarse;
   FineOptions fine;
@@ -41,13 +51,16 @@ struct AlignmentOptions {
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field(
         "method", self.method,
-        "auto: robust after a network's joint pass; where the alignment is given, or both epochs "
-        "are parts of one model, the paper's refinement; change by free-space votes in either "
-        "case. robust: all seven parameters from places that photos of both epochs show alike, "
+        "auto: robust after a network's joint pass; coarse where photos of both epochs were placed "
+        "in one model; where the alignment is given, the paper's refinement; change by free-space "
+        "votes in each case. robust: all seven parameters from places that photos of both epochs "
+        "show alike, "
         "from the static surfaces and from what each photo shows, and change by free-space votes. "
         "paper: the joint pass, the translation refinement with its residual self-check, and "
         "change by nearest-neighbour distance, all as in the paper. coarse: the joint pass "
         "alone, change as in paper.");
+    field("find_sky", self.find_sky,
+          "Find the sky by the network's confidence and leave it out: it has no surface.");
     field("shared_intrinsics", self.shared_intrinsics,
           "Give all frames of a pass the first frame's intrinsics and rescale their depths to "
           "match, as "
@@ -70,10 +83,18 @@ struct InitialAlignment {
   std::string source;                          // "joint pass", "aligned epochs", or a file name
   std::string remedy;                          // what to do if the epochs do not fit together
   bool own_joint_pass = false;  // joint is an estimate of its own, not a part of one common model
+
+  InitialSource kind() const {
+    if (!joint) return InitialSource::kGiven;
+    return own_joint_pass ? InitialSource::kOwnJointPass : InitialSource::kOneModel;
+  }
 };
 
 struct Alignment {
-  Sim3 t2_from_t1;                             // chosen: x_T2 = s R x_T1 + t
+  // Chosen: x_T2 = s R x_T1 + t. The first carries the cameras: trajectories, COLMAP, metres by
+  // cameras. The second fits what the photos show: change, things, PLY, plausibility. They differ
+  // where the robust refinement was chosen.
+  Sim3 t2_from_t1, surface_t2_from_t1;
   Sim3 initial_t2_from_t1;                     // before refinement
   std::string initial_source;                  // as in InitialAlignment
   std::optional<CoarseResult> coarse;          // with a joint pass
@@ -86,6 +107,7 @@ struct Alignment {
   // Of t2_from_t1 where it is known: measured on the keyframes of the joint pass, and with method
   // robust on the surfaces as well. The paper's translation update is not known to reduce it.
   std::optional<SimilarityCovariance> uncertainty;
+  std::optional<SimilarityCovariance> surface_uncertainty;  // the same of surface_t2_from_t1
   std::string verdict;      // machine-readable: refined, kept_coarse_..., coarse, given
   std::string explanation;  // one sentence
   PlausibilityResult plausibility;

@@ -19,6 +19,21 @@ const std::string& photo_name(const Reconstruction& epoch, const InstancePhoto& 
   return epoch.views[static_cast<size_t>(photo.frame)].name;
 }
 
+// Why it is taken for a thing.
+Json signs_json(const ThingSigns& signs) {
+  return {{"pixel_confidence", signs.pixel_confidence},
+          {"gap_sigmas", signs.evidence},
+          {"seen_through", signs.seen_through},
+          {"called_changed", signs.called_changed},
+          {"fill", signs.fill},
+          {"length", signs.length},
+          {"width", signs.width},
+          {"photos", signs.photos},
+          {"photos_with_body", signs.photos_with_body},
+          {"body", signs.body},
+          {"at_edge", signs.at_edge}};
+}
+
 Json part_json(const InstancePart& part, const Reconstruction& epoch) {
   Json photos = Json::array();
   for (const InstancePhoto& photo : part.photos) {
@@ -36,6 +51,7 @@ Json part_json(const InstancePart& part, const Reconstruction& epoch) {
           {"surface_sigma_u2", part.surface_sigma_u2},
           {"confidence", part.confidence},
           {"pixels", part.pixels},
+          {"signs", signs_json(part.signs)},
           {"photos", photos}};
 }
 
@@ -97,6 +113,8 @@ void write_change_list(const std::filesystem::path& directory, const ChangeInsta
                {"unit", frame.unit},
                {"scene_extent_u", changes.scene_extent_u},
                {"voxel_size_u", instances.voxel_size_u},
+               {"unsure_regions", instances.unsure},
+               {"unsure_confidence", instances.unsure_confidence},
                {"changes", Json::array()}};
   std::string csv;
   for (const char* column :

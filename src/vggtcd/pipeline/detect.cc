@@ -13,6 +13,7 @@
 #include "vggtcd/registration/shared_intrinsics.h"
 #include "vggtcd/report/read_results.h"
 #include "vggtcd/scene/local_frame.h"
+#include "vggtcd/scene/sky.h"
 
 namespace vggtcd {
 namespace {
@@ -39,6 +40,11 @@ Epochs read_epochs(const EpochInputs& inputs, const AlignmentOptions& options, S
     stage.advance(0.8);
     if (inputs.joint) {
       epochs.joint = read_joint(*inputs.joint, epochs.before, epochs.after, log.progress());
+    }
+    if (options.find_sky) {
+      remove_sky(epochs.before);
+      remove_sky(epochs.after);
+      if (epochs.joint) remove_sky(epochs.joint->reconstruction);
     }
     if (options.shared_intrinsics) {
       share_intrinsics(epochs.before);
@@ -79,7 +85,8 @@ Json inputs_json(const EpochInputs& inputs, const Epochs& epochs) {
     return Json{{"file", name.empty() ? path.filename().string() : name},
                 {"frames", r.num_frames()},
                 {"width", r.width},
-                {"height", r.height}};
+                {"height", r.height},
+                {"sky_share", sky_share(r)}};
   };
   Json json = {{"before", epoch(inputs.before, epochs.before, inputs.before_name)},
                {"after", epoch(inputs.after, epochs.after, inputs.after_name)}};
@@ -129,7 +136,7 @@ class FractionsOf : public ProgressSink {
 void announce(const Epochs& epochs, const EpochInputs& inputs, const DetectOptions& options,
               ProgressSink& progress) {
   const JobSize size{epochs.before.num_frames(), epochs.after.num_frames(), epochs.before.width,
-                     epochs.before.height, epochs.initial.own_joint_pass};
+                     epochs.before.height, epochs.initial.kind()};
   std::vector<PlannedStage> stages =
       plan_detect(size, options, decides_by_votes(options, inputs.has_holes));
   stages.erase(stages.begin());  // reading is done
@@ -153,8 +160,8 @@ OutputContents register_contents(bool authors_layout) {
 }
 
 PointVariance registration_variance(const Alignment& alignment) {
-  if (!alignment.uncertainty) return {};
-  return {alignment.uncertainty->covariance, alignment.uncertainty->pivot};
+  const auto& uncertainty = alignment.surface_uncertainty;
+  return uncertainty ? PointVariance{uncertainty->covariance, uncertainty->pivot} : PointVariance{};
 }
 
 // A verdict over nothing is none.
@@ -225,7 +232,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   // 2. Align: coarse, fine.
   const Alignment alignment =
       align(epochs.before, epochs.after, epochs.initial, options.alignment, log);
-  const Sim3& t2_from_t1 = alignment.t2_from_t1;
+  const Sim3& surface_t2_from_t1 = alignment.surface_t2_from_t1;
   outcome.alignment = in_worlds(alignment, origins_of(epochs));
   epochs.joint.reset();
 
@@ -234,14 +241,14 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   std::optional<AnswerStore> answers;  // where photos vote
   ChangeSet changes;
   log.run("change detection", [&](ProgressStage&) {
-    changes = detect_changes(epochs.before, epochs.after, t2_from_t1, options.change);
+    changes = detect_changes(epochs.before, epochs.after, surface_t2_from_t1, options.change);
   });
   if (decides_by_votes(options, inputs.has_holes)) {
     answers.emplace(aside);
     log.run("free-space votes", [&](ProgressStage& stage) {
       FractionsOf fractions(stage);
       FreeSpaceChange votes =
-          free_space_changes(epochs.before, epochs.after, t2_from_t1, options.free_space,
+          free_space_changes(epochs.before, epochs.after, surface_t2_from_t1, options.free_space,
                              registration_variance(alignment), fractions,
                              question ? &*question : nullptr, answers->sink());
       outcome.explanation = std::move(votes.explanation);
@@ -251,8 +258,16 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   expect_evidence(changes);
   ChangeInstances instances;
   log.run("changed things", [&](ProgressStage&) {
-    instances = find_instances(epochs.before, epochs.after, t2_from_t1, changes, options.instances);
+    instances =
+        find_instances(epochs.before, epochs.after, surface_t2_from_t1, changes, options.instances);
   });
+  if (instances.unsure > 0) {
+    progress.notice(fmt::format(
+        "{} regions look changed, but are not sure enough to be listed as things (confidence "
+        "{:.2f} "
+        "at most, expected {:.2f}); --min-confidence lists them",
+        instances.unsure, instances.unsure_confidence, options.instances.min_confidence));
+  }
   for (const ChangeInstance& instance : instances.instances) {
     outcome.removed += instance.kind == InstanceClass::kRemoved ? 1 : 0;
     outcome.added += instance.kind == InstanceClass::kAdded ? 1 : 0;
@@ -268,18 +283,18 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   // 4. From here on everything is in the frame and the unit of the results.
   ResultFrame frame(epochs.after);
   if (metres) {
-    const Metric metric =
-        metres->solve(epochs.before, epochs.after, t2_from_t1, changes.surface_sigma_u);
+    const Metric metric = metres->solve(epochs.before, epochs.after, alignment.t2_from_t1,
+                                        surface_t2_from_t1, changes.surface_sigma_u);
     frame = ResultFrame(metric, epochs.after);
     outcome.metric = in_worlds(metric, epochs.after.origin_in_world);
   }
   express(frame, changes, answers ? &*answers : nullptr, instances, outcome.explanation);
-  const Sim3 result_from_t1 = frame.from_t2 * t2_from_t1;
+  const Sim3 result_from_t1 = frame.from_t2 * surface_t2_from_t1;
 
   // 5. Write.
   log.run("write results", [&](ProgressStage& stage) {
     write_json_file(aside / "sim3.json", sim3_json(outcome.alignment, outcome.metric));
-    write_cameras(aside, epochs.before, epochs.after, t2_from_t1, frame);
+    write_cameras(aside, epochs.before, epochs.after, alignment.t2_from_t1, frame);
     const AnswerStore* voted = answers ? &*answers : nullptr;
     write_change_npz(aside / "change.npz", epochs.before, epochs.after, changes, instances, voted,
                      frame);
@@ -335,8 +350,9 @@ RegisterOutcome register_epochs(const EpochInputs& inputs, const AlignmentOption
   RegisterOutcome outcome{in_worlds(local, origins_of(epochs)), {}};
   const Alignment& alignment = outcome.alignment;
   if (metres) {
-    outcome.metric = in_worlds(metres->solve(epochs.before, epochs.after, local.t2_from_t1, 0),
-                               epochs.after.origin_in_world);
+    outcome.metric = in_worlds(
+        metres->solve(epochs.before, epochs.after, local.t2_from_t1, local.surface_t2_from_t1, 0),
+        epochs.after.origin_in_world);
     summary["metric"] = metric_json(*outcome.metric);
   }
   log.run("write results", [&](ProgressStage&) {

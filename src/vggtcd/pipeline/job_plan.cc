@@ -33,10 +33,9 @@ std::vector<PlannedStage> plan_detect(const JobSize& size, const DetectOptions& 
   };
   add("read predictions", kReadUs, false);
   add("coarse alignment", kAlignUs, true);
-  add("fine alignment", kAlignUs, true);
-  if (resolve_method(options.alignment.method, size.own_joint_pass) == AlignmentMethod::kRobust) {
-    add("robust alignment", kRobustUs, true);
-  }
+  const AlignmentMethod method = resolve_method(options.alignment.method, size.initial);
+  if (method != AlignmentMethod::kCoarse) add("fine alignment", kAlignUs, true);
+  if (method == AlignmentMethod::kRobust) add("robust alignment", kRobustUs, true);
   add("plausibility", kPlausibilityUs, true);
   add("change detection", kCompareUs, true);
   if (votes) add("free-space votes", kVotesUs, true);

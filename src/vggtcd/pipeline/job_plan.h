@@ -13,8 +13,8 @@ namespace vggtcd {
 
 struct JobSize {
   int frames_before = 0, frames_after = 0;
-  int width = 0, height = 0;   // px, of a frame
-  bool own_joint_pass = true;  // the joint reconstruction is an estimate of its own
+  int width = 0, height = 0;  // px, of a frame
+  InitialSource initial = InitialSource::kOwnJointPass;
   double pixels() const {
     return static_cast<double>(frames_before + frames_after) * width * height;
   }

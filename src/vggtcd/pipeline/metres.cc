@@ -141,7 +141,8 @@ void MetricProblem::match_cameras(const std::filesystem::path& path, const Recon
 }
 
 Metric MetricProblem::solve(const Reconstruction& before, const Reconstruction& after,
-                            const Sim3& t2_from_t1, double point_sigma_u) const {
+                            const Sim3& t2_from_t1, const Sim3& surface_t2_from_t1,
+                            double point_sigma_u) const {
   Metric metric;
   if (lengths_.empty()) {
     std::vector<Eigen::Vector3d> in_t2, in_metres;
@@ -158,8 +159,8 @@ Metric MetricProblem::solve(const Reconstruction& before, const Reconstruction& 
   }
   std::vector<KnownLength> lengths;
   for (const Length& length : lengths_) {
-    const double length_u = (point_in_t2(length.a, before, after, t2_from_t1) -
-                             point_in_t2(length.b, before, after, t2_from_t1))
+    const double length_u = (point_in_t2(length.a, before, after, surface_t2_from_t1) -
+                             point_in_t2(length.b, before, after, surface_t2_from_t1))
                                 .norm();
     if (!(length_u > 0)) {
       throw_error(ErrorCode::kUsage, "{}: {} and {} are one place; expected two", kOption,

@@ -49,9 +49,10 @@ class MetricProblem {
   // photo.
   MetricProblem(const MetricInputs& inputs, const Reconstruction& before,
                 const Reconstruction& after, ProgressSink& progress);
+  // Cameras go by t2_from_t1, distances between pixels by surface_t2_from_t1 (alignment.h).
   // point_sigma_u: the standard deviation of a surface point, 0 if not known (metric_frame.h).
   Metric solve(const Reconstruction& before, const Reconstruction& after, const Sim3& t2_from_t1,
-               double point_sigma_u) const;
+               const Sim3& surface_t2_from_t1, double point_sigma_u) const;
 
  private:
   struct Length {

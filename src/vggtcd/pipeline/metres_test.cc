@@ -43,7 +43,7 @@ struct Scene {
 Metric solve(const MetricInputs& inputs, const Scene& scene,
              ProgressSink& progress = silent_progress()) {
   return MetricProblem(inputs, scene.before, scene.after, progress)
-      .solve(scene.before, scene.after, kT2FromT1, 0);
+      .solve(scene.before, scene.after, kT2FromT1, kT2FromT1, 0);
 }
 
 TEST(KnownDistance, MayJoinPhotosOfEitherEpoch) {

@@ -125,8 +125,9 @@ void remove_partial_files(const fs::path& folder) {
 }
 
 JobSize job_size(const ReconstructionPlan& plan, const Reconstructor& reconstructor) {
-  return {plan.frames_before, plan.frames_after, plan.width, plan.height,
-          reconstructor.has_own_joint_pass()};
+  return {
+      plan.frames_before, plan.frames_after, plan.width, plan.height,
+      reconstructor.has_own_joint_pass() ? InitialSource::kOwnJointPass : InitialSource::kOneModel};
 }
 
 std::vector<PlannedStage> whole_job(const ReconstructionPlan& plan,
@@ -210,7 +211,7 @@ std::string describe_plan(const EpochInputs& inputs, const DetectOptions& option
   const PredictionSize before = prediction_size(inputs.before);
   const PredictionSize after = prediction_size(inputs.after);
   const JobSize size{before.frames, after.frames, before.width, before.height,
-                     inputs.joint.has_value()};
+                     inputs.joint ? InitialSource::kOwnJointPass : InitialSource::kGiven};
   const bool votes = decides_by_votes(options, false);
   return fmt::format(
       "Predictions: {} frames before, {} after\n"

@@ -65,6 +65,7 @@ Json robust_json(const RobustResult& robust) {
                {"residual_sigma_u", robust.residual_sigma_u},
                {"ties", robust.ties},
                {"ties_used", robust.ties_used},
+               {"ties_contradict", robust.ties_contradict},
                {"tie_deviation", robust.tie_deviation},
                {"compared_by", enum_to_string(robust.compared_by)},
                {"cost_initial", robust.cost_initial},
@@ -129,6 +130,9 @@ Trajectory trajectory_of(const std::vector<View>& views) {
 Json sim3_json(const Alignment& alignment, const std::optional<Metric>& metric) {
   Json json = sim3_to_json(alignment.t2_from_t1);
   json["maps"] = "x_T2 = scale * rotation * x_T1 + translation";
+  json["used_by"] = "cameras: cameras_*.tum, colmap/";
+  json["surfaces"] = sim3_to_json(alignment.surface_t2_from_t1);
+  json["surfaces"]["used_by"] = "surfaces: change, things, before_aligned.ply, plausibility";
   json["chosen"] = alignment.chosen;
   json["verdict"] = alignment.verdict;
   json["explanation"] = alignment.explanation;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "vggtcd/core/error.h"
+#include "vggtcd/registration/tie_weights.h"
 #include "vggtcd/scene/oriented_points.h"
 
 namespace vggtcd {
@@ -31,7 +32,9 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
     ties = find_tie_points(before, after, initial.t2_from_t1, options.tie_photos);
   }
   choice.robust = align_robust(t1, t2, ties, initial.t2_from_t1, start.uncertainty, options);
-  choice.t2_from_t1 = initial.t2_from_t1;
+  // Candidates are compared by the ties that the refinement went by.
+  if (choice.robust.ties_contradict) ties = agreeing_ties(ties, initial.t2_from_t1);
+  choice.t2_from_t1 = choice.surface_t2_from_t1 = initial.t2_from_t1;
   choice.chosen = initial.name;
   choice.verdict = enum_to_string(choice.robust.verdict);
   choice.explanation = choice.robust.explanation;
@@ -44,14 +47,15 @@ AlignmentChoice choose_alignment(const Reconstruction& before, const Reconstruct
         {"fine", fine.t2_from_t1,
          candidate_cost(t1, t2, ties, fine.t2_from_t1, choice.robust, options)});
   }
-  if (choice.robust.verdict == RobustVerdict::kRefined) {
+  if (choice.robust.refined()) {
     choice.candidates.push_back({"robust", choice.robust.t2_from_t1, choice.robust.cost_final});
   }
   const AlignmentCandidate& best = *std::min_element(
       choice.candidates.begin(), choice.candidates.end(),
       [](const AlignmentCandidate& a, const AlignmentCandidate& b) { return a.cost < b.cost; });
   choice.chosen = best.name;
-  choice.t2_from_t1 = best.t2_from_t1;
+  choice.t2_from_t1 = choice.surface_t2_from_t1 = best.t2_from_t1;
+  if (best.name == "robust") choice.surface_t2_from_t1 = choice.robust.surface_t2_from_t1;
   if (best.name == "fine") {
     choice.verdict = enum_to_string(fine.verdict);
     choice.explanation = fmt::format(

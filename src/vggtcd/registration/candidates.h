@@ -22,10 +22,10 @@ struct AlignmentCandidate {
 };
 
 struct AlignmentChoice {
-  Sim3 t2_from_t1;
-  std::string chosen;       // the name of a candidate
-  std::string verdict;      // of the stage it came from, machine-readable
-  std::string explanation;  // one sentence
+  Sim3 t2_from_t1, surface_t2_from_t1;  // as in RobustResult; the same one of other candidates
+  std::string chosen;                   // the name of a candidate
+  std::string verdict;                  // of the stage it came from, machine-readable
+  std::string explanation;              // one sentence
   RobustResult robust;
   std::vector<AlignmentCandidate> candidates;  // what was compared; the smallest cost was chosen
 };

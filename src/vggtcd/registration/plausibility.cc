@@ -172,7 +172,8 @@ std::span<const EnumName<Plausibility>> enum_names(Plausibility) {
 }
 
 PlausibilityResult judge_plausibility(const SurfaceAgreement& surfaces,
-                                      const std::optional<CoarseResult>& coarse) {
+                                      const std::optional<CoarseResult>& coarse,
+                                      std::span<const std::string> doubts) {
   PlausibilityResult result;
   result.surfaces = surfaces;
   double unexplained = 0;
@@ -208,8 +209,9 @@ PlausibilityResult judge_plausibility(const SurfaceAgreement& surfaces,
                   "the epochs' surfaces do not agree: " + describe_surfaces(surfaces));
   }
   if ((surfaces.above_chance() < kDoubtAboveChance && !certain) ||
-      unexplained > kDoubtUnexplained) {
+      unexplained > kDoubtUnexplained || !doubts.empty()) {
     std::string why = describe_surfaces(surfaces);
+    for (const std::string& doubt : doubts) why += "; " + doubt;
     if (unexplained > kDoubtUnexplained) {
       why += fmt::format("; the joint pass leaves {:.0f} % of its points' variance unexplained",
                          100 * unexplained);

@@ -58,7 +58,9 @@ struct PlausibilityResult {
 };
 
 // The verdict on these numbers; docs/numerics.md has the thresholds and what they rest on.
+// `doubts`: sentences about how the alignment was found; any makes it doubtful at best.
 PlausibilityResult judge_plausibility(const SurfaceAgreement& surfaces,
-                                      const std::optional<CoarseResult>& coarse);
+                                      const std::optional<CoarseResult>& coarse,
+                                      std::span<const std::string> doubts = {});
 
 }  // namespace vggtcd

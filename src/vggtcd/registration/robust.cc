@@ -103,6 +103,7 @@ double surface_cost(const SurfaceMatcher& matcher, const Sim3& t2_from_t1, doubl
 std::span<const EnumName<RobustVerdict>> enum_names(RobustVerdict) {
   static constexpr EnumName<RobustVerdict> kNames[] = {
       {RobustVerdict::kRefined, "refined"},
+      {RobustVerdict::kNotConverged, "not_converged"},
       {RobustVerdict::kKeptInitialFewPairs, "kept_initial_few_pairs"},
       {RobustVerdict::kKeptInitialNotBetter, "kept_initial_not_better"}};
   return kNames;
@@ -175,7 +176,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
                           const RobustOptions& options) {
   options.validate();
   RobustResult result;
-  result.t2_from_t1 = initial_t2_from_t1;
+  result.t2_from_t1 = result.surface_t2_from_t1 = initial_t2_from_t1;
   result.points_t1 = static_cast<int64_t>(t1.size());
   result.points_t2 = static_cast<int64_t>(t2.size());
   if (result.points_t1 + result.points_t2 < options.min_pairs || t1.size() == 0 || t2.size() == 0) {
@@ -219,16 +220,27 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     weighed = weigh_ties(ties, current, equations.photos ? &*equations.photos : nullptr, step);
   };
   bool searching = ties.empty();  // ties need no search: until they have converged they go alone
-  while (!result.converged && result.iterations < options.max_iterations) {
+  std::vector<TiePoint> agreeing;
+  int steps = 0;  // since the start, or since it started again
+  while (!result.converged && steps < options.max_iterations) {
     ++result.iterations;
-    searching = searching || 2 * result.iterations >= options.max_iterations;
+    ++steps;
+    searching = searching || 2 * steps >= options.max_iterations;
     if (searching) search();
     weigh();
-    if (searching && !ties.empty() && !believable(weighed, result.ties, options)) {
-      ties = {};  // start again without them
-      weigh();
+    if (searching && !ties.empty() && !believable(weighed, number_across(ties), options)) {
+      // Start again, with those that agree pair by pair; if they have been asked already, without.
+      if (!result.ties_contradict) agreeing = agreeing_ties(ties, initial_t2_from_t1);
+      const bool asked = result.ties_contradict || number_across(agreeing) < options.min_ties;
+      result.ties_contradict = true;
+      ties = asked ? std::span<const TiePoint>() : agreeing;
       current = initial_t2_from_t1;
-      search();
+      equations = {};
+      steps = 1;
+      searching = ties.empty();
+      pairs.clear();
+      if (searching) search();
+      weigh();
     }
     if (ties.empty() && pairs.empty()) {
       result.explanation = fmt::format(
@@ -261,7 +273,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
       constraints_of(held_information(equations.information, pairs, !ties.empty(), photos,
                                       result.pivot_in_t2, spread),
                      prior_covariance, result.pivot_in_t2, t2.origin_in_world);
-  result.covariance = constraints.covariance;
+  result.covariance = result.surface_covariance = constraints.covariance;
   result.constrained_share = constraints.constrained_share;
   result.open_degrees_of_freedom = constraints.open_degrees_of_freedom;
   result.open_motions = constraints.open_motions;
@@ -282,8 +294,8 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
         ties.empty() ? "static surfaces" : "tie points", result.cost_initial, result.cost_final);
     return result;
   }
-  result.verdict = RobustVerdict::kRefined;
-  result.t2_from_t1 = current;
+  result.verdict = result.converged ? RobustVerdict::kRefined : RobustVerdict::kNotConverged;
+  result.t2_from_t1 = result.surface_t2_from_t1 = current;
   if (spread) {
     search();
     weigh();
@@ -293,6 +305,7 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
     for (Eigen::Vector3d& camera : cameras_t1) camera = current * camera;
     const CameraFit fit =
         fit_cameras(errors, cameras_t1, t2.cameras, result.pivot_in_t2, result.covariance, *spread);
+    result.surface_covariance += fit.bend;
     if (options.camera_fit) {
       result.t2_from_t1 = small_similarity(fit.step, result.pivot_in_t2) * current;
       result.covariance = fit.covariance;
@@ -304,12 +317,30 @@ RobustResult align_robust(const OrientedPoints& t1, const OrientedPoints& t2,
   result.explanation = fmt::format(
       "Refined rotation, translation and scale on {}{} static surface pairs, which fit to {:.3g}.",
       ties_used, pairs.size(), result.residual_sigma_u);
+  if (!result.converged) {
+    result.explanation +=
+        fmt::format(" It did not come to rest in {} steps, so it may be off by more than it says.",
+                    result.iterations);
+  }
   if (!result.open_motions.empty()) {
     result.explanation += fmt::format(
         " Held by the initial alignment only, not by what is static: {} (in the T2 frame).",
         fmt::join(result.open_motions, "; "));
   }
   return result;
+}
+
+std::vector<std::string> RobustResult::doubts() const {
+  std::vector<std::string> doubts;
+  if (verdict == RobustVerdict::kNotConverged) {
+    doubts.emplace_back("the refinement did not come to rest");
+  }
+  if (ties_contradict) {
+    doubts.push_back(fmt::format(
+        "places that photos of both epochs show alike contradict each other, and {} of {} are used",
+        ties_used, ties));
+  }
+  return doubts;
 }
 
 double candidate_cost(const OrientedPoints& t1, const OrientedPoints& t2,

@@ -65,8 +65,8 @@ struct RobustOptions {
     field("min_ties", self.min_ties,
           "Robust: fewer of them between the epochs are taken for chance.");
     field("camera_fit", self.camera_fit,
-          "Robust: the similarity that carries the cameras, by what their photos show, is the "
-          "result; else the one that fits what they show. Needs frame-errors.");
+          "Robust: the cameras get a similarity of their own, by what their photos show; else the "
+          "one that fits the surfaces. Needs frame-errors.");
     field(
         "prior_sigma", self.prior_sigma,
         "Robust: assumed standard deviation of the initial alignment's rotation (rad), log scale, "
@@ -82,6 +82,7 @@ struct RobustOptions {
 
 enum class RobustVerdict {
   kRefined,
+  kNotConverged,          // refined, and better than before, but it did not come to rest
   kKeptInitialFewPairs,   // not enough static surface, and no ties
   kKeptInitialNotBetter,  // the robust cost did not fall
 };
@@ -91,7 +92,11 @@ enum class CandidateCost { kSurfaces, kTiePoints };
 std::span<const EnumName<CandidateCost>> enum_names(CandidateCost);
 
 struct RobustResult {
-  Sim3 t2_from_t1;  // carries the cameras, if asked for (camera_fit); else what they show
+  // A reconstruction is bent, so two similarities: that which carries the cameras, for trajectories
+  // (camera_fit; without it the other one), and that which fits what the photos show, for all that
+  // is said about surfaces.
+  Sim3 t2_from_t1;
+  Sim3 surface_t2_from_t1;
   RobustVerdict verdict = RobustVerdict::kKeptInitialFewPairs;
   std::string explanation;
 
@@ -100,6 +105,7 @@ struct RobustResult {
   // Of the seven parameters of t2_from_t1 about the pivot, from surfaces, ties, the photos' own
   // errors, the initial uncertainty, and (with frame_errors) the bend of both passes.
   Matrix7 covariance = Matrix7::Zero();
+  Matrix7 surface_covariance = Matrix7::Zero();  // of surface_t2_from_t1, likewise
   // Per degree of freedom, 0 to 1: the share of what is known about it that comes from surfaces and
   // ties (the rest is the initial similarity): one minus the ratio of variances. A plane without
   // ties leaves two translations, a rotation and the scale near 0.
@@ -117,6 +123,7 @@ struct RobustResult {
   double residual_sigma_u = 0, relative_sigma = 0;
   int64_t ties = 0;                // between the epochs, found
   int64_t ties_used = 0;           // of them, not outliers; 0 if ties were not believed
+  bool ties_contradict = false;    // each other: only those count that agree pair of photos by pair
   double tie_deviation = 0;        // of their distances against what they promise
   InitialUncertainty uncertainty;  // what was assumed or measured beforehand
   bool uncertainty_measured = false;
@@ -124,6 +131,12 @@ struct RobustResult {
   double tie_variance = 0;  // as tie_deviation^2, with the photos' own errors: scales tie_cost
   bool converged = false;   // the last step was below a tenth of a standard deviation
   double cost_initial = 0, cost_final = 0;  // candidate_cost of the start and the surfaces' fit
+
+  // What a reader of the result should know before believing it; empty: nothing.
+  std::vector<std::string> doubts() const;
+  bool refined() const {  // the similarities are better than the start
+    return verdict == RobustVerdict::kRefined || verdict == RobustVerdict::kNotConverged;
+  }
 };
 
 // Gauss-Newton over the ties and, once they have converged, the nearest pairs of surfaces, in one

@@ -200,6 +200,33 @@ TEST(AlignRobust, TiesThatContradictEachOtherAreDropped) {
             0.02 * difference(kError, {}).norm());
 }
 
+TEST(AlignRobust, OfTiesThatContradictEachOtherThoseCountThatAgreePairByPair) {
+  const auto flat = [](double, double) { return 0.0; };
+  const OrientedPoints t1 = points_of(flat, 0), t2 = points_of(flat, 0.13);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> anywhere(-0.4, 0.4);
+  std::vector<TiePoint> ties = ties_on_the_plane(800, 0);
+  const auto pair_of = [](const TiePoint& tie) {
+    return 5 * tie.first_photo.frame + tie.second_photo.frame;
+  };
+  std::ranges::stable_sort(ties, {}, pair_of);  // as find_tie_points leaves them
+  int64_t agreeing = 0;
+  for (TiePoint& tie : ties) {
+    if (tie.first_photo.frame == 2) {
+      ++agreeing;
+    } else {
+      tie.second += Eigen::Vector3d(anywhere(random), anywhere(random), anywhere(random));
+    }
+  }
+  const RobustResult result = align_robust(t1, t2, ties, kError, {}, {});
+  EXPECT_TRUE(result.ties_contradict);
+  EXPECT_EQ(result.doubts().size(), 1u);
+  EXPECT_EQ(result.compared_by, CandidateCost::kTiePoints);
+  EXPECT_LE(result.ties_used, agreeing);
+  EXPECT_GT(result.ties_used, 0.9 * static_cast<double>(agreeing));
+  EXPECT_LT(difference(result.t2_from_t1, {}).norm(), 0.2 * difference(kError, {}).norm());
+}
+
 TEST(AlignRobust, TiesAloneDoWhereSurfacesAreTooFew) {
   RobustOptions options;
   options.static_distance = 1e-4;  // hardly a pair is that near

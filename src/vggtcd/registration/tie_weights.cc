@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "vggtcd/core/error.h"
@@ -17,6 +18,7 @@ constexpr double kMedianOfChiSquared3 = 2.366;
 constexpr double kLeastVariance = 0.25;
 // Tukey's constant is for one residual; three reach farther at the same efficiency.
 constexpr double kTukeyWidening = 1.225;
+constexpr int64_t kMinAgreeing = 6;  // ties of a pair of photos; fewer may be chance
 
 PointPair under(const TiePoint& tie, const Sim3& t2_from_t1) {
   const Eigen::Matrix3d axes = t2_from_t1.scale * t2_from_t1.rotation;
@@ -35,6 +37,36 @@ PointPair under(const TiePoint& tie, const Sim3& t2_from_t1) {
 
 double squared_distance(const PointPair& point, const Eigen::Vector3d& difference) {
   return difference.dot(point.information * difference);
+}
+
+bool same_photo(PhotoNumber a, PhotoNumber b) { return a.of_t1 == b.of_t1 && a.frame == b.frame; }
+
+bool same_photos(const TiePoint& a, const TiePoint& b) {
+  return same_photo(a.first_photo, b.first_photo) && same_photo(a.second_photo, b.second_photo);
+}
+
+// Of one pair of photos.
+void append_agreeing(std::span<const TiePoint> pair, const Sim3& t2_from_t1,
+                     std::vector<TiePoint>& kept) {
+  std::array<std::vector<double>, 3> axis;
+  std::vector<PointPair> points;
+  for (const TiePoint& tie : pair) {
+    const PointPair& point = points.emplace_back(under(tie, t2_from_t1));
+    for (size_t k = 0; k < 3; ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      axis[k].push_back(point.first[row] - point.second[row]);
+    }
+  }
+  const Eigen::Vector3d common(middle_of(axis[0]), middle_of(axis[1]), middle_of(axis[2]));
+  constexpr double kReach = 3 * 4.685 * kTukeyWidening;
+  const auto agrees = [&](const PointPair& point) {
+    return squared_distance(point, point.first - point.second - common) < kReach * kReach;
+  };
+  const auto agreeing = std::ranges::count_if(points, agrees);
+  if (agreeing < kMinAgreeing || 2 * agreeing < std::ssize(pair)) return;
+  for (size_t i = 0; i < pair.size(); ++i) {
+    if (agrees(points[i])) kept.push_back(pair[i]);
+  }
 }
 
 double tukey_sigma(double variance) { return kTukeyWidening * std::sqrt(variance); }
@@ -59,6 +91,17 @@ WeighedTies weigh_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1,
     result.used += weight > 0 && ties[i].across() ? 1 : 0;
   }
   return result;
+}
+
+std::vector<TiePoint> agreeing_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1) {
+  std::vector<TiePoint> kept;
+  for (size_t first = 0; first < ties.size();) {
+    size_t last = first + 1;
+    while (last < ties.size() && same_photos(ties[first], ties[last])) ++last;
+    append_agreeing(ties.subspan(first, last - first), t2_from_t1, kept);
+    first = last;
+  }
+  return kept;
 }
 
 double tie_cost(std::span<const TiePoint> ties, const Sim3& t2_from_t1, double variance) {

@@ -27,6 +27,13 @@ struct WeighedTies {
 WeighedTies weigh_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1,
                        const PhotoErrors* photos, const Vector7& theta);
 
+// The ties that agree with the others of their pair of photos, whatever both photos err in common:
+// of each pair those whose difference is near the pair's median difference, within three times
+// what they promise, if they are at least six and half of the pair's; the other pairs are left out
+// as a whole. In their order. Ties of one pair stand next to each other, as find_tie_points leaves
+// them.
+std::vector<TiePoint> agreeing_ties(std::span<const TiePoint> ties, const Sim3& t2_from_t1);
+
 // The mean Tukey loss (0 to 1) of the distances at that variance, of ties between the epochs; of
 // those within one no similarity says anything. At least one tie is between the epochs.
 double tie_cost(std::span<const TiePoint> ties, const Sim3& t2_from_t1, double variance);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <random>
 
 namespace vggtcd {
@@ -115,6 +116,38 @@ TEST(TieCost, IsLeastAtTheTruth) {
   Sim3 far = kT2FromT1;
   far.translation.x() += 100;
   EXPECT_EQ(tie_cost(ties, far, 1), 1);
+}
+
+TEST(AgreeingTies, AreThoseNearTheMedianOfTheirPairOfPhotos) {
+  std::vector<TiePoint> ties = draws(400);
+  // One photo after the other, as find_tie_points leaves them.
+  std::ranges::stable_sort(ties, {}, [](const TiePoint& tie) {
+    return 2 * tie.first_photo.frame + tie.second_photo.frame;
+  });
+  const auto photos = [](const TiePoint& tie) {
+    return std::pair(tie.first_photo.frame, tie.second_photo.frame);
+  };
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> anywhere(-4, 4);
+  size_t expected = 0;
+  for (size_t i = 0; i < ties.size(); ++i) {
+    if (photos(ties[i]) == std::pair(0, 0)) {
+      ties[i].second += Eigen::Vector3d(2, 1, -3);  // both photos err, and agree
+      if (i % 10 == 0) {
+        ties[i].second += Eigen::Vector3d(9, 9, 9);
+      } else {
+        ++expected;
+      }
+    } else if (photos(ties[i]) == std::pair(0, 1)) {
+      ties[i].second += Eigen::Vector3d(anywhere(engine), anywhere(engine), anywhere(engine));
+    } else {
+      ++expected;
+    }
+  }
+  const std::vector<TiePoint> kept = agreeing_ties(ties, kT2FromT1);
+  EXPECT_EQ(kept.size(), expected);
+  for (const TiePoint& tie : kept) EXPECT_NE(photos(tie), std::pair(0, 1));
+  EXPECT_TRUE(agreeing_ties(std::span(ties).first(5), kT2FromT1).empty());  // five may be chance
 }
 
 }  // namespace

@@ -56,6 +56,7 @@ void remove_frames(Reconstruction& reconstruction, const std::vector<bool>& remo
   compact(remove, pixels, reconstruction.depth);
   compact(remove, pixels, reconstruction.confidence);
   compact(remove, 3 * pixels, reconstruction.color);
+  if (!reconstruction.sky.empty()) compact(remove, pixels, reconstruction.sky);
   for (size_t frame = 0; frame < remove.size(); ++frame) {
     if (remove[frame]) reconstruction.left_out.push_back(static_cast<int>(frame));
   }
@@ -66,6 +67,7 @@ void check_consistent(const Reconstruction& r) {
   check(r.depth.size() == r.num_pixels(), "reconstruction: depth is [S, H, W]");
   check(r.confidence.size() == r.num_pixels(), "reconstruction: confidence is [S, H, W]");
   check(r.color.size() == 3 * r.num_pixels(), "reconstruction: color is [S, H, W, 3]");
+  check(r.sky.empty() || r.sky.size() == r.num_pixels(), "reconstruction: sky is [S, H, W]");
   for (const View& view : r.views) {
     check(view.pinhole.width == r.width && view.pinhole.height == r.height,
           "reconstruction: every view has the frame size");

@@ -32,6 +32,9 @@ struct Reconstruction {
   std::vector<float> depth;  // [S, H, W], z along the optical axis in model units, >= 0, finite
   std::vector<float> confidence;  // [S, H, W], only ever ranked; not a probability
   std::vector<uint8_t> color;     // [S, H, W, 3] RGB
+  // [S, H, W]: which pixels without depth show the sky (scene/sky.h); empty: none, or nobody
+  // looked.
+  std::vector<uint8_t> sky{};
   // Where this frame's origin lies in the world of the file that was read; the axes and the unit
   // are the file's. Not zero only where the file's own origin is far away (local_frame.h).
   Eigen::Vector3d origin_in_world = Eigen::Vector3d::Zero();
@@ -54,6 +57,9 @@ struct Reconstruction {
     return frame_of(confidence, frame, 1);
   }
   std::span<const uint8_t> frame_color(int frame) const { return frame_of(color, frame, 3); }
+  std::span<const uint8_t> frame_sky(int frame) const {  // empty where sky is
+    return sky.empty() ? std::span<const uint8_t>() : frame_of(sky, frame, 1);
+  }
 
  private:
   template <typename T>

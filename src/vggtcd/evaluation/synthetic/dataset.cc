@@ -99,7 +99,8 @@ Sim3 best_t2_from_t1(const SceneTruth& truth, const Reconstruction& t1, const Re
 void synthesize(const fs::path& directory, const SynthesizeOptions& options,
                 ProgressSink& progress) {
   options.validate();
-  const SyntheticScene scene = make_scene(options.scene, options.seed, options.change);
+  const SyntheticScene scene =
+      make_scene(options.scene, options.seed, options.change, options.texture);
   OutputDirectory out(directory, contents_of(options));
   if (options.photos) {
     for (const char* folder : kEpochFolder) out.subdirectory(folder);

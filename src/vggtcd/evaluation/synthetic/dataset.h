@@ -16,6 +16,7 @@ struct SynthesizeOptions {
   std::string scene = "kitchen";
   uint64_t seed = 1;
   SceneChange change = SceneChange::kScene;
+  SceneTexture texture = SceneTexture::kScene;
   int keyframes = 5;
   int jpeg_quality = 92;
   bool photos = true;
@@ -28,6 +29,8 @@ struct SynthesizeOptions {
     field("seed", self.seed, "varies shapes, places, textures, walks, light and errors");
     field("change", self.change,
           "scene: what changes is the scene's own list; none: nothing changes but light and walk");
+    field("texture", self.texture,
+          "scene: each surface its own; one: all surfaces the same; none: plain surfaces");
     field("keyframes", self.keyframes, "keyframes per epoch in the joint pass (the paper's K)");
     field("jpeg_quality", self.jpeg_quality, "1 to 100");
     field("photos", self.photos, "write before/ and after/");

@@ -106,8 +106,9 @@ class PassSimulator {
   PassSimulator(const SceneTruth& truth, const std::vector<FrameRef>& frames,
                 const ErrorModel& errors, uint64_t seed, uint64_t draw)
       : truth_(truth),
-        errors_(errors),
+        errors_(errors.with_size_applied()),
         key_(mix64(seed, draw)),
+        is_joint_(shows_both_epochs(frames)),
         pass_size_(pass_size(frames, errors)),
         warp_(kShortestWave * truth.extent_m, kLongestWave * truth.extent_m,
               Random(key_, {kWarp})) {}
@@ -119,7 +120,9 @@ class PassSimulator {
     const double pass_focal = 1 + errors_.focal * focal.normal();
     for (size_t k = 0; k < frames.size(); ++k) {
       FrameErrors frame;
-      const bool out = outlier.uniform() < errors_.outlier_share && k > 0;
+      const bool drawn = outlier.uniform() < errors_.outlier_share;
+      const bool chosen = is_joint_ && static_cast<int>(k) <= errors_.outlier_keyframes;
+      const bool out = k > 0 && (drawn || chosen);
       frame.size = out ? std::max(pass_size_, errors_.outlier_factor) : pass_size_;
       frame.focal = pass_focal + errors_.focal / 3 * focal.normal();
       const Vector3d turn{drift.normal(), drift.normal(), drift.normal()};
@@ -191,6 +194,11 @@ class PassSimulator {
     result.rotation = camera_from_world.rotation * turn.transpose();
     result.translation = -(result.rotation * (eye + warp_m(eye) + extra_shift_m));
     return result;
+  }
+
+  static bool shows_both_epochs(const std::vector<FrameRef>& frames) {
+    return std::ranges::any_of(
+        frames, [&](const FrameRef& frame) { return frame.epoch != frames[0].epoch; });
   }
 
   // A multi-view estimate errs less the more photos see a place, down to what the network cannot do
@@ -289,8 +297,9 @@ class PassSimulator {
   }
 
   const SceneTruth& truth_;
-  const ErrorModel& errors_;
+  ErrorModel errors_;
   uint64_t key_;
+  bool is_joint_;
   double pass_size_;
   SmoothField warp_;
 };
@@ -329,8 +338,19 @@ double units_per_metre(const SyntheticScene& scene, const SceneTruth& truth, uin
 
 }  // namespace
 
+ErrorModel ErrorModel::with_size_applied() const {
+  ErrorModel larger = *this;
+  larger.error_size = 1;
+  for (double* size :
+       {&larger.warp, &larger.depth_low_frequency, &larger.depth_pixel, &larger.frame_scale,
+        &larger.drift_rotation_deg, &larger.drift_translation, &larger.focal}) {
+    *size *= error_size;
+  }
+  return larger;
+}
+
 void ErrorModel::validate() const {
-  for_each_field(*this, [](std::string_view name, const double& value, std::string_view) {
+  for_each_field(*this, [](std::string_view name, const auto& value, std::string_view) {
     check_field(value >= 0, name, value, "at least 0");
   });
   check_field(pose_depth_consistency <= 1, "pose_depth_consistency", pose_depth_consistency,

@@ -30,6 +30,8 @@ struct ErrorModel {
   double confidence_noise = 0.35;
   double outlier_share = 0.03;
   double outlier_factor = 8.0;
+  int outlier_keyframes = 0;
+  double error_size = 1;
 
   static constexpr auto fields = [](auto&& self, auto&& field) {
     field("warp", self.warp, "smooth deformation of the whole pass, of the extent");
@@ -53,8 +55,13 @@ struct ErrorModel {
           "what confidence does not know about the error, in natural log units");
     field("outlier_share", self.outlier_share, "share of frames that go wrong, never the first");
     field("outlier_factor", self.outlier_factor, "by how much an outlier's errors are larger");
+    field("outlier_keyframes", self.outlier_keyframes,
+          "photos of the joint pass that go wrong for certain, from the second on");
+    field("error_size", self.error_size,
+          "all errors of depths, cameras and intrinsics are this many times as large");
   };
   void validate() const;
+  ErrorModel with_size_applied() const;  // error_size is 1 then
 };
 
 struct FrameRef {

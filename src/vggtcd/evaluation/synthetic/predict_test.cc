@@ -35,7 +35,8 @@ const Case& fixture() {
 
 ErrorModel no_errors() {
   ErrorModel errors;
-  for_each_field(errors, [](std::string_view, double& value, std::string_view) { value = 0; });
+  for_each_field(errors, [](std::string_view, auto& value, std::string_view) { value = 0; });
+  errors.error_size = 1;
   return errors;
 }
 
@@ -288,6 +289,74 @@ TEST(SimulatePass, OutlierFramesAreFarOffAndLessSure) {
   }
   EXPECT_GE(outliers, 2);
   EXPECT_LE(outliers, 8);
+}
+
+// How far the cameras of a pass differ, in metres.
+double moved_m(const Reconstruction& a, const Reconstruction& b, size_t frame,
+               double units_per_metre) {
+  return (camera_center(a.views[frame].camera_from_world) -
+          camera_center(b.views[frame].camera_from_world))
+             .norm() /
+         units_per_metre;
+}
+
+TEST(SimulatePass, OutlierKeyframesGoWrongInTheJointPassAlone) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors;
+  errors.outlier_share = 0;
+  const SimulatedPredictions calm = simulate_predictions(scene, truth, 4, errors);
+  errors.outlier_keyframes = 2;
+  const SimulatedPredictions wild = simulate_predictions(scene, truth, 4, errors);
+  for (size_t frame = 0; frame < 8; ++frame) {
+    const double moved = moved_m(wild.joint.reconstruction, calm.joint.reconstruction, frame,
+                                 calm.joint_from_world.scale);
+    if (frame == 1 || frame == 2) {
+      EXPECT_GT(moved, 1e-4) << frame;
+    } else {
+      EXPECT_LT(moved, 1e-9) << frame;
+    }
+    EXPECT_LT(moved_m(wild.t1.reconstruction, calm.t1.reconstruction, frame, 1), 1e-12);
+  }
+}
+
+TEST(SimulatePass, ErrorsAreTwiceAsLargeWhereAskedFor) {
+  const auto& [scene, truth] = fixture();
+  ErrorModel errors = no_errors();
+  errors.drift_translation = 0.002;
+  const SimulatedPredictions none = simulate_predictions(scene, truth, 3, no_errors());
+  const SimulatedPredictions once = simulate_predictions(scene, truth, 3, errors);
+  errors.error_size = 2;
+  const SimulatedPredictions twice = simulate_predictions(scene, truth, 3, errors);
+  const auto from_none = [&](const SimulatedPredictions& p) {
+    // The pass stands in the frame of its first camera, which drifts too: compare what is between.
+    double sum = 0;
+    for (size_t frame = 1; frame < 10; ++frame) {
+      sum += moved_m(p.t1.reconstruction, none.t1.reconstruction, frame, 1);
+    }
+    return sum;
+  };
+  EXPECT_NEAR(from_none(twice), 2 * from_none(once), 0.02 * from_none(twice));
+}
+
+// The mean step in grey from a pixel to the next one.
+double contrast(SceneTexture texture) {
+  const SyntheticScene scene = make_scene("kitchen", 4, SceneChange::kScene, texture);
+  RenderOptions options;
+  options.frames = 2;
+  options.width = 130;
+  options.photo_scale = 1;
+  options.samples = 1;
+  const EpochTruth epoch = render(scene, options, silent_progress()).of(Epoch::kT1);
+  double sum = 0;
+  for (size_t i = 3; i < epoch.color.size(); i += 3) {
+    sum += std::abs(int{epoch.color[i]} - int{epoch.color[i - 3]});
+  }
+  return sum / static_cast<double>(epoch.color.size() / 3);
+}
+
+TEST(SceneTexture, NoneIsPlainAndOneIsNot) {
+  EXPECT_LT(contrast(SceneTexture::kNone), 0.7 * contrast(SceneTexture::kScene));
+  EXPECT_GT(contrast(SceneTexture::kOne), 1.3 * contrast(SceneTexture::kNone));
 }
 
 }  // namespace

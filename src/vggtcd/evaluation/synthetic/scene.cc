@@ -58,6 +58,23 @@ Vector3d spline(const std::vector<Vector3d>& knots, double t) {
                 u * u * u * (3 * b - a - 3 * c + d));
 }
 
+// Colours stay with kNone; with kOne everything is chequered, as far as the photos tell.
+void apply_texture(SceneTexture texture, std::vector<Material>& materials) {
+  if (texture == SceneTexture::kScene) return;
+  for (Material& material : materials) {
+    if (texture == SceneTexture::kOne) {
+      material = {.texture = Texture::kChequer,
+                  .color = {0.55f, 0.3f, 0.22f},
+                  .second_color = {0.7f, 0.68f, 0.62f},
+                  .feature_m = 0.15f};
+    } else {
+      material.texture = Texture::kChequer;  // in one colour
+      material.second_color = material.color;
+      material.gloss = 0;
+    }
+  }
+}
+
 // OpenCV axes (x right, y down, z forward) for an upright camera.
 Rigid3 look_at(const Vector3d& eye, const Vector3d& target) {
   const Vector3d z = (target - eye).normalized();
@@ -87,6 +104,12 @@ ObjectChange SceneObject::change() const {
   return same ? ObjectChange::kUnchanged : ObjectChange::kMoved;
 }
 
+std::span<const EnumName<SceneTexture>> enum_names(SceneTexture) {
+  static constexpr EnumName<SceneTexture> kNames[] = {
+      {SceneTexture::kScene, "scene"}, {SceneTexture::kOne, "one"}, {SceneTexture::kNone, "none"}};
+  return kNames;
+}
+
 std::span<const EnumName<SceneChange>> enum_names(SceneChange) {
   static constexpr EnumName<SceneChange> kNames[] = {{SceneChange::kScene, "scene"},
                                                      {SceneChange::kNone, "none"}};
@@ -110,13 +133,15 @@ std::span<const std::string_view> all_scene_names() {
 
 std::span<const std::string_view> scene_names() { return all_scene_names().first(kNumScenes); }
 
-SyntheticScene make_scene(std::string_view name, uint64_t seed, SceneChange change) {
+SyntheticScene make_scene(std::string_view name, uint64_t seed, SceneChange change,
+                          SceneTexture texture) {
   for (const NamedScene& entry : kScenes) {
     if (entry.name != name) continue;
     SceneBuilder builder(name, seed);
     builder.scene.outdoor = entry.outdoor;
     entry.build(builder);
     if (change == SceneChange::kNone) take_changes_back(builder.scene.objects);
+    apply_texture(texture, builder.scene.materials);
     return std::move(builder.scene);
   }
   std::string known;

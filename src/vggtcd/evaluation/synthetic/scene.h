@@ -80,10 +80,18 @@ enum class SceneChange {
 };
 std::span<const EnumName<SceneChange>> enum_names(SceneChange);
 
+enum class SceneTexture {
+  kScene,  // every surface its own
+  kOne,    // the same on every surface: what is seen in one place may be another one
+  kNone    // plain surfaces
+};
+std::span<const EnumName<SceneTexture>> enum_names(SceneTexture);
+
 // The scene of that name and seed; the seed varies shapes, places, textures, walks, light and which
 // small things change. Error{kUsage} for an unknown name.
 SyntheticScene make_scene(std::string_view name, uint64_t seed,
-                          SceneChange change = SceneChange::kScene);
+                          SceneChange change = SceneChange::kScene,
+                          SceneTexture texture = SceneTexture::kScene);
 
 // The cameras of a walk: camera_from_world, OpenCV axes. The speed varies along the path and the
 // hand shakes, both drawn from the scene's seed.

@@ -230,6 +230,11 @@ Vector3f surface_color(const Material& m, const SurfacePoint& p) {
     case Texture::kPaint:
       color = m.color * (1 + 0.08f * octaves(p, 0.5f, 6, m.seed));
       break;
+    case Texture::kChequer:
+      color = (floor_int(p.uv_m.x() / m.feature_m) + floor_int(p.uv_m.y() / m.feature_m)) % 2 == 0
+                  ? m.color
+                  : m.second_color;
+      break;
   }
   return color.cwiseMax(0.01f).cwiseMin(0.95f);
 }

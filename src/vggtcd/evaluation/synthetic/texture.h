@@ -21,7 +21,8 @@ enum class Texture {
   kText,    // rows of glyphs
   kBooks,   // spines side by side
   kMetal,
-  kPaint  // nearly plain, glossy
+  kPaint,   // nearly plain, glossy
+  kChequer  // two colours in squares of feature_m: every corner looks like every other
 };
 
 struct Material {
