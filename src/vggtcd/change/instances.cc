@@ -57,13 +57,12 @@ class EpochRegions {
     parallel_for(static_cast<int64_t>(members_.size()), 1, [&](int64_t i, int64_t) {
       const size_t region = static_cast<size_t>(i);
       const auto& members = members_[region];
-      if (members.size() < static_cast<size_t>(options.min_instance_points)) return;
-      const ThingSigns signs = signs_of(members, changes);
-      if (!may_be_thing(signs, options)) return;
-      const double confidence = thing_probability(signs);
+      const std::optional<ThingSigns> signs = signs_of(members, changes, options);
+      if (!signs) return;
+      const double confidence = thing_probability(*signs);
       if (confidence >= options.min_confidence) {
-        parts[region] = measure(members, signs, mean);
-      } else if (signs.photos_with_body > 0 && confidence >= kUnsure) {
+        parts[region] = measure(members, *signs, mean);
+      } else if (signs->photos_with_body > 0 && confidence >= kUnsure) {
         unsure[region] = confidence;
       }
     });
@@ -134,19 +133,31 @@ class EpochRegions {
   // the own epoch agree on.
   bool is_thing(const RegionPoints& members, const ChangeSet& changes,
                 const InstanceOptions& options) const {
-    if (members.size() < static_cast<size_t>(options.min_instance_points)) return false;
-    const ThingSigns signs = signs_of(members, changes);
-    return may_be_thing(signs, options) && thing_probability(signs) >= options.min_confidence;
+    const std::optional<ThingSigns> signs = signs_of(members, changes, options);
+    return signs && thing_probability(*signs) >= options.min_confidence;
   }
 
-  // But for its confidence.
-  static bool may_be_thing(const ThingSigns& signs, const InstanceOptions& options) {
-    return signs.photos >= options.min_photos && signs.length >= options.min_size_fraction &&
-           signs.width >= options.min_width_fraction && signs.fill >= options.min_fill;
-  }
-
-  ThingSigns signs_of(const RegionPoints& members, const ChangeSet& changes) const {
+  // Nothing where the points are too few or their box is no thing's; what is dear to know comes
+  // last.
+  std::optional<ThingSigns> signs_of(const RegionPoints& members, const ChangeSet& changes,
+                                     const InstanceOptions& options) const {
+    if (members.size() < static_cast<size_t>(options.min_instance_points)) return {};
     ThingSigns signs;
+    const std::vector<Eigen::Vector3f> voxels = voxel_means(members, positions_, components_.voxel);
+    const OrientedBox box = principal_box(voxels);
+    const double face = std::max(voxel_size_, box.size[0]) * std::max(voxel_size_, box.size[1]);
+    signs.fill = static_cast<double>(voxels.size()) * voxel_size_ * voxel_size_ / face;
+    signs.length = box.size[0] / changes.scene_extent_u;
+    signs.width = box.size[1] / changes.scene_extent_u;
+    if (signs.length < options.min_size_fraction || signs.width < options.min_width_fraction ||
+        signs.fill < options.min_fill) {
+      return {};
+    }
+    std::vector<uint32_t> pixels;
+    pixels.reserve(members.size());
+    for (const uint32_t i : members) pixels.push_back(pixels_[i]);
+    add_body(epoch_, pixels, signs);
+    if (signs.photos < options.min_photos) return {};
     signs.pixel_confidence =
         change_.changed_confidence.empty() ? kWithoutVotes : mean_confidence(members);
     if (!change_.changed_evidence.empty()) {
@@ -155,16 +166,6 @@ class EpochRegions {
       }
       signs.evidence /= static_cast<double>(members.size());
     }
-    const std::vector<Eigen::Vector3f> voxels = voxel_means(members, positions_, components_.voxel);
-    const OrientedBox box = principal_box(voxels);
-    const double face = std::max(voxel_size_, box.size[0]) * std::max(voxel_size_, box.size[1]);
-    signs.fill = static_cast<double>(voxels.size()) * voxel_size_ * voxel_size_ / face;
-    signs.length = box.size[0] / changes.scene_extent_u;
-    signs.width = box.size[1] / changes.scene_extent_u;
-    std::vector<uint32_t> pixels;
-    pixels.reserve(members.size());
-    for (const uint32_t i : members) pixels.push_back(pixels_[i]);
-    add_body(epoch_, pixels, signs);
     const OwnTestimony own = ask_own_epoch(members, changes);
     signs.seen_through = own.seen_through;
     signs.called_changed = own.called_changed;

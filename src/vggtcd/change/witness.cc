@@ -16,9 +16,8 @@ namespace {
 // poses of two photos need not agree to the pixel.
 constexpr int kOpenMarginSteps = 40;
 
-void mark_open_sky(const Reconstruction& epoch, size_t frame, std::span<uint8_t> extremes) {
-  const std::span<const uint8_t> sky =
-      std::span(epoch.sky).subspan(frame * epoch.pixels_per_frame(), epoch.pixels_per_frame());
+void mark_open_sky(const Reconstruction& epoch, int frame, std::span<uint8_t> extremes) {
+  const std::span<const uint8_t> sky = epoch.frame_sky(frame);
   std::vector<uint8_t> open(sky.size());
   std::ranges::transform(sky, open.begin(), [](uint8_t s) { return s == kOpenSky ? 1 : 0; });
   const PixelCounts counts(open, epoch.width, epoch.height);
@@ -65,7 +64,7 @@ Witness make_witness(const Reconstruction& epoch, const Sim3& t2_from_epoch, flo
       }
     }
     if (!epoch.sky.empty()) {
-      mark_open_sky(epoch, static_cast<size_t>(frame),
+      mark_open_sky(epoch, static_cast<int>(frame),
                     std::span(witness.extremes).subspan(first, epoch.pixels_per_frame()));
     }
   });

@@ -54,6 +54,7 @@ MethodOutcome outcome_of(const std::string& method, const MethodAnswer& answer,
   if (!answer.failure.empty()) return outcome;
   outcome.seconds = answer.seconds;
   outcome.found = answer.found;
+  outcome.plausibility = plausibility_of(answer.found, problem);
   try {
     const BitemporalTrajectory mapped = register_trajectory(
         poses_of(problem.before.views), poses_of(problem.after.views), outcome.found.t2_from_t1);

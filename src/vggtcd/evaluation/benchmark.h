@@ -70,6 +70,7 @@ struct MethodOutcome {
   TrajectoryErrors errors;
   double seconds = 0;
   RegistrationAnswer found;
+  std::string plausibility;  // plausibility_of
   // Camera centres in the truth's frame after the one alignment of the protocol, for plots.
   std::vector<Eigen::Vector3d> centers_t1, centers_t2;
 };

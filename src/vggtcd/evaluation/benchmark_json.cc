@@ -59,7 +59,7 @@ void members(T& v, const Visit& io) {
   io("t2_from_t1", v.found.t2_from_t1);
   io("surface_t2_from_t1", v.found.surface_t2_from_t1);
   io("verdict", v.found.verdict);
-  io("plausibility", v.found.plausibility);
+  io("plausibility", v.plausibility);
   io("errors", v.errors);
   io("centers_t1", v.centers_t1);
   io("centers_t2", v.centers_t2);

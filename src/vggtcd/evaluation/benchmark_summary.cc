@@ -60,6 +60,16 @@ const MethodOutcome* find_outcome(const SceneOutcome& scene, const std::string& 
   return nullptr;
 }
 
+const ChangeOutcome* find_change(const SceneOutcome& scene, const std::string& method,
+                                 const std::string& alignment) {
+  for (const ChangeOutcome& c : scene.changes) {
+    if (c.method == method && c.alignment == alignment && !c.unseen_counted && !c.every_pixel) {
+      return &c;
+    }
+  }
+  return nullptr;
+}
+
 double best_ate(const SceneOutcome& scene) {
   double best = std::numeric_limits<double>::infinity();
   for (const MethodOutcome& outcome : scene.methods) {

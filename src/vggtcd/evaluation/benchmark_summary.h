@@ -12,6 +12,10 @@ namespace vggtcd {
 
 // The outcome of a method that has numbers, or null.
 const MethodOutcome* find_outcome(const SceneOutcome& scene, const std::string& method);
+// How a change detection method did where only surface that both epochs saw counts, of it the
+// pixels with evidence; or null.
+const ChangeOutcome* find_change(const SceneOutcome& scene, const std::string& method,
+                                 const std::string& alignment);
 // The smallest ATE of a scene; infinite if no method has one.
 double best_ate(const SceneOutcome& scene);
 

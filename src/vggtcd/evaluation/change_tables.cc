@@ -54,12 +54,8 @@ std::string by_scene(const std::vector<SceneOutcome>& scenes,
   for (const SceneOutcome& scene : scenes) {
     out += fmt::format("| {} | {:.1f} |", scene_title(scene), 100 * scene.changed_share);
     for (const ChangeSummary* s : columns) {
-      const auto found =
-          std::find_if(scene.changes.begin(), scene.changes.end(), [&](const ChangeOutcome& c) {
-            return c.method == s->method && c.alignment == s->alignment && !c.unseen_counted &&
-                   !c.every_pixel;
-          });
-      out += found == scene.changes.end()
+      const ChangeOutcome* found = find_change(scene, s->method, s->alignment);
+      out += found == nullptr
                  ? " |"
                  : fmt::format(" {:.3f} / {:.3f} / {:.1f} |", found->scores.f1, found->scores.auprc,
                                100 * found->unseen_called_changed);

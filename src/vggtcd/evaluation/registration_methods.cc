@@ -4,7 +4,6 @@
 
 #include "vggtcd/evaluation/baselines/rivals.h"
 #include "vggtcd/registration/candidates.h"
-#include "vggtcd/registration/coarse.h"
 #include "vggtcd/registration/fine.h"
 #include "vggtcd/registration/plausibility.h"
 
@@ -15,25 +14,17 @@ Sim3 align_coarse_only(const RegistrationProblem& problem) {
   return align_coarse(problem.before, problem.after, problem.joint, {}).t2_from_t1;
 }
 
-// The same verdict as `detect` gives.
-RegistrationAnswer judged(RegistrationAnswer answer, const RegistrationProblem& problem,
-                          const CoarseResult& coarse, const std::vector<std::string>& doubts = {}) {
-  const SurfaceAgreement surfaces =
-      surface_agreement(problem.before, problem.after, answer.surface_t2_from_t1);
-  answer.plausibility = enum_to_string(judge_plausibility(surfaces, coarse, doubts).verdict);
-  return answer;
-}
-
 RegistrationAnswer align_as_paper(const RegistrationProblem& problem) {
-  const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
+  CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
   const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
   RegistrationAnswer answer = fine.t2_from_t1;
   answer.verdict = enum_to_string(fine.verdict);
-  return judged(answer, problem, coarse);
+  answer.coarse = std::move(coarse);
+  return answer;
 }
 
 RegistrationAnswer align_robustly(const RegistrationProblem& problem) {
-  const CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
+  CoarseResult coarse = align_coarse(problem.before, problem.after, problem.joint, {});
   const FineResult fine = align_fine(problem.before, problem.after, coarse.t2_from_t1, {});
   const RobustStart start =
       start_from_joint(problem.before, problem.after, problem.joint, coarse, {}, {});
@@ -42,7 +33,9 @@ RegistrationAnswer align_robustly(const RegistrationProblem& problem) {
   answer.t2_from_t1 = choice.t2_from_t1;
   answer.surface_t2_from_t1 = choice.surface_t2_from_t1;
   answer.verdict = choice.verdict;
-  return judged(answer, problem, coarse, choice.robust.doubts());
+  answer.coarse = std::move(coarse);
+  answer.doubts = choice.robust.doubts();
+  return answer;
 }
 
 RegistrationMethod rival(const std::string& name, std::string title) {
@@ -56,6 +49,14 @@ RegistrationMethod rival(const std::string& name, std::string title) {
 }
 
 }  // namespace
+
+std::string plausibility_of(const RegistrationAnswer& answer, const RegistrationProblem& problem) {
+  if (!answer.coarse) return "";
+  const SurfaceAgreement surfaces =
+      surface_agreement(problem.before, problem.after, answer.surface_t2_from_t1);
+  return std::string(
+      enum_to_string(judge_plausibility(surfaces, answer.coarse, answer.doubts).verdict));
+}
 
 std::vector<RegistrationMethod> registration_methods() {
   std::vector<RegistrationMethod> methods;

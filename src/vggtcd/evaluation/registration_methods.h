@@ -3,10 +3,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "vggtcd/geometry/sim3.h"
+#include "vggtcd/registration/coarse.h"
 #include "vggtcd/scene/reconstruction.h"
 
 namespace vggtcd {
@@ -21,9 +23,11 @@ struct RegistrationProblem {
 // (registration/robust.h).
 struct RegistrationAnswer {
   Sim3 t2_from_t1, surface_t2_from_t1;
-  // What `detect` would say, machine-readable: the method about itself, and whether the alignment
-  // can be believed (registration/plausibility.h). Empty for methods that `detect` has not.
-  std::string verdict{}, plausibility{};
+  // Of the methods that `detect` has: the verdict of the method about itself, machine-readable, and
+  // what whether the alignment can be believed depends on (registration/plausibility.h).
+  std::string verdict{};
+  std::optional<CoarseResult> coarse{};
+  std::vector<std::string> doubts{};
 
   RegistrationAnswer() = default;
   RegistrationAnswer(const Sim3& of_both) : t2_from_t1(of_both), surface_t2_from_t1(of_both) {}
@@ -38,6 +42,10 @@ struct RegistrationMethod {
   std::function<RegistrationAnswer(const RegistrationProblem&)> run;
   std::string absent_because;
 };
+
+// Whether `detect` would believe the alignment, machine-readable; empty for methods that it has
+// not. Apart from `run`, for it is no part of the registration that is timed.
+std::string plausibility_of(const RegistrationAnswer& answer, const RegistrationProblem& problem);
 
 // In the order of the paper's tables: identity, the rivals, coarse only, the paper's method, and
 // what came later.

@@ -9,6 +9,7 @@
 
 #include "vggtcd/core/error.h"
 #include "vggtcd/core/number_text.h"
+#include "vggtcd/evaluation/change_benchmark.h"
 #include "vggtcd/evaluation/synthetic/render.h"
 #include "vggtcd/io/colmap.h"
 #include "vggtcd/io/coordinate.h"
@@ -110,12 +111,6 @@ int64_t frame_pixel(const Maps& truth, const Maps& frame, size_t u, size_t v) {
 constexpr float kNoEvidence = std::numeric_limits<float>::quiet_NaN();
 constexpr float kNotObserved = -std::numeric_limits<float>::infinity();
 
-// What the results say about every pixel of the truth.
-struct Answers {
-  std::vector<float> rank;      // kNoEvidence, kNotObserved, or more for rather changed
-  std::vector<uint8_t> called;  // changed
-};
-
 // What the results say about the pixels of their own frames, whatever method made them.
 class Judgement {
  public:
@@ -145,8 +140,10 @@ class Judgement {
   std::vector<float> rank_;
 };
 
-Answers answer_pixels(const NpzReader& change, const std::string& suffix,
-                      const ResultFrames& frames, const Maps& truth) {
+// What the results say about every pixel of the truth: kNoEvidence, kNotObserved, or more for
+// rather changed.
+ChangeAnswer answer_pixels(const NpzReader& change, const std::string& suffix,
+                           const ResultFrames& frames, const Maps& truth) {
   const Maps maps = maps_of(change, "score" + suffix);
   if (maps.frames != frames.poses.size()) {
     throw_error(ErrorCode::kInput, "{}: expected {} frames as in colmap/, found {}", change.name(),
@@ -154,7 +151,7 @@ Answers answer_pixels(const NpzReader& change, const std::string& suffix,
   }
   const Judgement judgement(change, suffix, maps);
   const size_t pixels = truth.frames * truth.per_frame();
-  Answers answers{std::vector<float>(pixels, kNoEvidence), std::vector<uint8_t>(pixels, 0)};
+  ChangeAnswer answers{std::vector<float>(pixels, kNoEvidence), std::vector<uint8_t>(pixels, 0)};
   for (size_t k = 0; k < maps.frames; ++k) {
     size_t to = static_cast<size_t>(frames.true_frame[k]) * truth.per_frame();
     for (size_t v = 0; v < truth.height; ++v) {
@@ -162,8 +159,8 @@ Answers answer_pixels(const NpzReader& change, const std::string& suffix,
         const int64_t pixel = frame_pixel(truth, maps, u, v);
         if (pixel < 0) continue;
         const size_t from = k * maps.per_frame() + static_cast<size_t>(pixel);
-        answers.rank[to] = judgement.rank(from);
-        answers.called[to] = judgement.changed(from) && !std::isnan(answers.rank[to]) ? 1 : 0;
+        answers.score[to] = judgement.rank(from);
+        answers.called[to] = judgement.changed(from) && !std::isnan(answers.score[to]) ? 1 : 0;
       }
     }
   }
@@ -179,43 +176,39 @@ std::string most_changed(const ResultFrames& frames, const std::vector<int64_t>&
   return frames.names.at(best);
 }
 
-struct Counts {
-  ScoredPixels evidence, every_pixel;
-  int64_t seen = 0, seen_with_evidence = 0, unseen = 0, unseen_called = 0;
-  std::vector<int64_t> found_in_frame;  // of the epoch that was counted last
+// What score_changes needs of an epoch: labels, objects and what the other epoch looked at.
+EpochTruth read_labels(const NpzReader& truth, const std::string& suffix, const Maps& maps) {
+  EpochTruth epoch;
+  for (const char* key : {"unseen_by_other", "instance"}) expect_maps(truth, key + suffix, maps);
+  epoch.label = truth.read<uint8_t>("changed" + suffix);
+  for (const uint8_t unseen : truth.read<uint8_t>("unseen_by_other" + suffix)) {
+    epoch.other_looked.push_back(unseen != 0 ? 0 : 1);
+  }
+  for (const int64_t object : truth.read<int64_t>("instance" + suffix)) {
+    epoch.object.push_back(object == 0 ? 0 : 1);  // only the sky counts apart
+  }
+  return epoch;
+}
+
+// Of surface that both epochs saw.
+struct Seen {
+  int64_t pixels = 0, with_evidence = 0;
+  std::vector<int64_t> found_in_frame;  // pixels of each frame that are rightly called changed
 };
 
-void count(const NpzReader& truth, const std::string& suffix, const Answers& answers,
-           const Maps& maps, Counts& counts) {
-  counts.found_in_frame.assign(maps.frames, 0);
-  expect_maps(truth, "unseen_by_other" + suffix, maps);
-  const auto label = truth.read<uint8_t>("changed" + suffix);
-  const auto unseen = truth.read<uint8_t>("unseen_by_other" + suffix);
-  expect_maps(truth, "instance" + suffix, maps);
-  const auto object = truth.read<int64_t>("instance" + suffix);
-  for (size_t pixel = 0; pixel < label.size(); ++pixel) {
-    const float rank = answers.rank[pixel];
-    const bool evidence = !std::isnan(rank), called = answers.called[pixel] != 0;
-    if (object[pixel] == 0) {  // sky
-      if (!evidence) continue;
-      counts.every_pixel.add(rank, called, false);
-      counts.evidence.add(rank, called, false);
-      continue;
+Seen count_seen(const EpochTruth& truth, const ChangeAnswer& answer, const Maps& maps) {
+  Seen seen;
+  seen.found_in_frame.assign(maps.frames, 0);
+  for (size_t pixel = 0; pixel < truth.label.size(); ++pixel) {
+    const bool void_or_sky = truth.label[pixel] == kLabelVoid || truth.object[pixel] == 0;
+    if (void_or_sky || !truth.other_looked[pixel]) continue;
+    ++seen.pixels;
+    seen.with_evidence += std::isnan(answer.score[pixel]) ? 0 : 1;
+    if (truth.label[pixel] == kLabelChanged && answer.called[pixel] != 0) {
+      ++seen.found_in_frame[pixel / maps.per_frame()];
     }
-    if (label[pixel] == kLabelVoid) continue;
-    if (unseen[pixel]) {
-      if (label[pixel] != kLabelUnchanged || !evidence) continue;
-      ++counts.unseen;
-      counts.unseen_called += called ? 1 : 0;
-      continue;
-    }
-    ++counts.seen;
-    counts.seen_with_evidence += evidence ? 1 : 0;
-    const bool changed = label[pixel] == kLabelChanged;
-    counts.every_pixel.add(evidence ? rank : kNotObserved, called, changed);
-    if (evidence) counts.evidence.add(rank, called, changed);
-    if (changed && called) ++counts.found_in_frame[pixel / maps.per_frame()];
   }
+  return seen;
 }
 
 }  // namespace
@@ -231,7 +224,9 @@ ResultsScores score_results(const std::filesystem::path& results,
   const NpzReader change(results / "change.npz");
   const ColmapModel cameras = read_colmap(results / "colmap");
   const BitemporalTrajectory true_cameras = read_true_cameras(truth_npz);
-  Counts counts;
+  EpochTruth labels[2];
+  ChangeAnswer answers[2];
+  int64_t seen_pixels = 0, seen_with_evidence = 0;
   ResultsScores scores;
   BitemporalTrajectory found, expected;
   for (const int e : {0, 1}) {
@@ -245,21 +240,26 @@ ResultsScores score_results(const std::filesystem::path& results,
     for (const int k : frames.true_frame) {
       (e == 0 ? expected.t1 : expected.t2).push_back(true_poses[static_cast<size_t>(k)]);
     }
-    count(truth, suffix, answer_pixels(change, suffix, frames, maps), maps, counts);
+    labels[e] = read_labels(truth, suffix, maps);
+    answers[e] = answer_pixels(change, suffix, frames, maps);
+    const Seen seen = count_seen(labels[e], answers[e], maps);
+    seen_pixels += seen.pixels;
+    seen_with_evidence += seen.with_evidence;
     (e == 0 ? scores.most_changed_t1 : scores.most_changed_t2) =
-        most_changed(frames, counts.found_in_frame);
+        most_changed(frames, seen.found_in_frame);
   }
   scores.frames_t1 = static_cast<int>(found.t1.size());
   scores.frames_t2 = static_cast<int>(found.t2.size());
   scores.true_frames_t1 = static_cast<int>(true_cameras.t1.size());
   scores.true_frames_t2 = static_cast<int>(true_cameras.t2.size());
   scores.cameras = evaluate_trajectory(found, expected);
-  scores.evidence_share = static_cast<double>(counts.seen_with_evidence) /
-                          static_cast<double>(std::max<int64_t>(1, counts.seen));
-  scores.unseen_called_changed = static_cast<double>(counts.unseen_called) /
-                                 static_cast<double>(std::max<int64_t>(1, counts.unseen));
-  scores.evidence = evaluate_changes(counts.evidence);
-  scores.every_pixel = evaluate_changes(counts.every_pixel);
+  scores.evidence_share = static_cast<double>(seen_with_evidence) /
+                          static_cast<double>(std::max<int64_t>(1, seen_pixels));
+  const std::vector<AnsweredEpoch> epochs = {{labels[0], answers[0]}, {labels[1], answers[1]}};
+  const ChangeOutcome evidence = score_changes(epochs, false, false);
+  scores.evidence = evidence.scores;
+  scores.unseen_called_changed = evidence.unseen_called_changed;
+  scores.every_pixel = score_changes(epochs, false, true).scores;
   return scores;
 }
 

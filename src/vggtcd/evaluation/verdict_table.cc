@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "vggtcd/evaluation/benchmark_summary.h"
 #include "vggtcd/evaluation/change_tables.h"
 
@@ -14,14 +12,6 @@ namespace {
 
 constexpr double kFarFromFloor = 2;       // times the ATE of the best Sim(3)
 constexpr double kManyFalseAlarms = 0.1;  // of the unchanged pixels
-
-// Pixels with evidence, surface that both epochs saw: as `detect` decides.
-double false_alarms_of(const SceneOutcome& scene) {
-  const auto found = std::ranges::find_if(scene.changes, [](const ChangeOutcome& c) {
-    return c.method == "votes" && c.alignment == "robust" && !c.unseen_counted && !c.every_pixel;
-  });
-  return found == scene.changes.end() ? 0 : found->scores.false_alarms;
-}
 
 }  // namespace
 
@@ -34,23 +24,23 @@ std::string verdict_section(const std::vector<SceneOutcome>& scenes) {
     if (robust == nullptr || coarse == nullptr || !(scene.best_fit_ate > 0)) continue;
     const double of_floor = robust->errors.ate_mean / scene.best_fit_ate;
     const double of_coarse = robust->errors.ate_mean / coarse->errors.ate_mean;
-    const double false_alarms = false_alarms_of(scene);
+    const ChangeOutcome* change = find_change(scene, "votes", "robust");
+    const double false_alarms = change == nullptr ? 0 : change->scores.false_alarms;
     ++judged;
-    if (robust->found.plausibility == "believable") {
+    if (robust->plausibility == "believable") {
       ++believable;
       far += of_floor > kFarFromFloor ? 1 : 0;
       alarming += false_alarms > kManyFalseAlarms ? 1 : 0;
     }
     rows += fmt::format("| {} | {} | {} | {:.2f} | {:.2f} | {:.2f} |\n", scene_title(scene),
-                        robust->found.verdict, robust->found.plausibility, of_floor, of_coarse,
+                        robust->found.verdict, robust->plausibility, of_floor, of_coarse,
                         100 * false_alarms);
   }
   if (judged == 0) return "";
   return fmt::format(
              "\n## Verdicts of the robust method\n\n{} of {} alignments are called believable. Of "
              "these {} have an ATE above twice the floor (what the best Sim(3) leaves), and {} "
-             "call "
-             "more than a tenth of the unchanged pixels changed.\n\n"
+             "call more than a tenth of the unchanged pixels changed.\n\n"
              "| Scene | verdict | plausibility | ATE, of the floor | ATE, of coarse | false alarms "
              "% |\n|---|---|---|---|---|---|\n",
              believable, judged, far, alarming) +

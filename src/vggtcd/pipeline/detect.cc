@@ -264,8 +264,7 @@ DetectOutcome detect(const EpochInputs& inputs, const DetectOptions& options,
   if (instances.unsure > 0) {
     progress.notice(fmt::format(
         "{} regions look changed, but are not sure enough to be listed as things (confidence "
-        "{:.2f} "
-        "at most, expected {:.2f}); --min-confidence lists them",
+        "{:.2f} at most, expected {:.2f}); --min-confidence lists them",
         instances.unsure, instances.unsure_confidence, options.instances.min_confidence));
   }
   for (const ChangeInstance& instance : instances.instances) {

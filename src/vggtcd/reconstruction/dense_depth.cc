@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "vggtcd/core/parallel.h"
+#include "vggtcd/scene/pixel_patch.h"
 
 namespace vggtcd {
 namespace {
@@ -120,24 +121,12 @@ void remove_small_patches(int width, int height, int min_patch_px, DepthMap& map
   constexpr float kConnected = 0.03f;
   std::vector<uint8_t> visited(map.depth.size());
   std::vector<size_t> patch;
-  const auto w = static_cast<size_t>(width), h = static_cast<size_t>(height);
   for (size_t seed = 0; seed < map.depth.size(); ++seed) {
     if (visited[seed] || !(map.depth[seed] > 0)) continue;
-    patch.assign(1, seed);
-    visited[seed] = 1;
-    for (size_t next = 0; next < patch.size(); ++next) {
-      const size_t i = patch[next];
-      const auto visit = [&](bool inside, size_t j) {
-        if (!inside || visited[j] || !(map.depth[j] > 0)) return;
-        if (std::abs(map.depth[j] - map.depth[i]) > kConnected * map.depth[i]) return;
-        visited[j] = 1;
-        patch.push_back(j);
-      };
-      visit(i % w > 0, i - 1);
-      visit(i % w + 1 < w, i + 1);
-      visit(i >= w, i - w);
-      visit(i / w + 1 < h, i + w);
-    }
+    grow_patch(seed, width, height, visited, patch, [&](size_t from, size_t to) {
+      return map.depth[to] > 0 &&
+             !(std::abs(map.depth[to] - map.depth[from]) > kConnected * map.depth[from]);
+    });
     if (patch.size() >= static_cast<size_t>(min_patch_px)) continue;
     for (const size_t i : patch) map.depth[i] = map.confidence[i] = 0;
   }

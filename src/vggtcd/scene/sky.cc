@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "vggtcd/core/parallel.h"
 #include "vggtcd/geometry/order_statistics.h"
+#include "vggtcd/scene/confidence.h"
 #include "vggtcd/scene/pixel_counts.h"
+#include "vggtcd/scene/pixel_patch.h"
 
 namespace vggtcd {
 namespace {
@@ -24,17 +27,18 @@ constexpr double kMinArea = 0.005;  // of the photo
 constexpr size_t kMinSurface = 50;  // pixels, to know how far away a photo's surfaces are
 constexpr double kMajority = 0.6;   // of the pixels around that has depth
 
-// Above it a pixel shows a surface; the floor itself where confidences say nothing about sky.
-float confidence_limit(const Reconstruction& r) {
-  std::vector<float> known;
+// Above it a pixel shows a surface; nothing where confidences say nothing about sky.
+std::optional<float> confidence_limit(const Reconstruction& r) {
+  bool any = false;
   for (size_t pixel = 0; pixel < r.num_pixels(); ++pixel) {
     if (!(r.depth[pixel] > 0)) continue;
-    if (r.confidence[pixel] < kFloor - kBelowFloor) return kFloor - 1;
-    known.push_back(r.confidence[pixel]);
+    if (r.confidence[pixel] < kFloor - kBelowFloor) return {};
+    any = true;
   }
-  if (known.empty()) return kFloor - 1;
-  const double percents[] = {kTypicalPercent};
-  const double above = percentiles(known, percents)[0] - static_cast<double>(kFloor);
+  if (!any) return {};
+  const double above =
+      static_cast<double>(confidence_percentile(r, kTypicalPercent)) - static_cast<double>(kFloor);
+  if (!(above > 0)) return {};
   return kFloor + static_cast<float>(std::min(kShareOfTypical * above, kMostAboveFloor));
 }
 
@@ -87,21 +91,8 @@ class SkyOfPhoto {
     bool any = false;
     for (size_t seed = 0; seed < candidate.size(); ++seed) {
       if (visited[seed] != 0 || candidate[seed] == 0 || !counts.all_around(seed, radius_)) continue;
-      area.assign(1, seed);
-      visited[seed] = 1;
-      for (size_t next = 0; next < area.size(); ++next) {
-        const size_t i = area[next];
-        const int u = static_cast<int>(i) % width_, v = static_cast<int>(i) / width_;
-        const auto visit = [&](bool inside, size_t neighbor) {
-          if (!inside || visited[neighbor] != 0 || candidate[neighbor] == 0) return;
-          visited[neighbor] = 1;
-          area.push_back(neighbor);
-        };
-        visit(u > 0, i - 1);
-        visit(u + 1 < width_, i + 1);
-        visit(v > 0, i - static_cast<size_t>(width_));
-        visit(v + 1 < height_, i + static_cast<size_t>(width_));
-      }
+      grow_patch(seed, width_, height_, visited, area,
+                 [&](size_t, size_t pixel) { return candidate[pixel] != 0; });
       if (static_cast<double>(area.size()) < kMinArea * static_cast<double>(candidate.size())) {
         continue;
       }
@@ -128,11 +119,11 @@ class SkyOfPhoto {
 }  // namespace
 
 size_t remove_sky(Reconstruction& r) {
-  const float limit = confidence_limit(r);
+  const std::optional<float> limit = confidence_limit(r);
   std::vector<std::vector<uint8_t>> found(r.views.size());
-  if (limit > kFloor) {
+  if (limit) {
     parallel_for(r.num_frames(), 1, [&](int64_t frame, int64_t) {
-      found[static_cast<size_t>(frame)] = SkyOfPhoto(r, static_cast<int>(frame), limit).find();
+      found[static_cast<size_t>(frame)] = SkyOfPhoto(r, static_cast<int>(frame), *limit).find();
     });
   }
   size_t pixels = 0;

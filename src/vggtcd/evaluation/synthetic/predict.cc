@@ -109,7 +109,7 @@ class PassSimulator {
         errors_(errors.with_size_applied()),
         key_(mix64(seed, draw)),
         is_joint_(shows_both_epochs(frames)),
-        pass_size_(pass_size(frames, errors)),
+        pass_size_(pass_size(frames, is_joint_, errors_)),
         warp_(kShortestWave * truth.extent_m, kLongestWave * truth.extent_m,
               Random(key_, {kWarp})) {}
 
@@ -203,10 +203,10 @@ class PassSimulator {
 
   // A multi-view estimate errs less the more photos see a place, down to what the network cannot do
   // better; photos of two states contradict each other wherever something changed.
-  static double pass_size(const std::vector<FrameRef>& frames, const ErrorModel& errors) {
+  static double pass_size(const std::vector<FrameRef>& frames, bool both,
+                          const ErrorModel& errors) {
     double count[2] = {};
     for (const FrameRef& frame : frames) ++count[static_cast<int>(frame.epoch)];
-    const bool both = count[0] > 0 && count[1] > 0;
     const double per_epoch = both ? 0.5 * (count[0] + count[1]) : count[0] + count[1];
     return std::sqrt(1 + errors.few_views / per_epoch) * (both ? 1 + errors.two_states : 1.0);
   }
